@@ -1,6 +1,6 @@
 /* How mbm_server_* answers bad input, and what can only be tested from C. */
 #include "crc.h"
-#include "mbm.h"
+#include "hooked_port.h"
 #include "test.h"
 
 static mbm_server server;
@@ -12,53 +12,8 @@ static mbm_diagnostics diagnostics;
 static uint16_t words[10];
 static uint8_t frame[MBM_MAX_ASCII_FRAME];
 
-/* A port in memory: bytes that arrive, bytes that were sent, and a clock. */
-static struct {
-    uint8_t arriving[600], sent[600];
-    size_t first, last, length;
-    uint32_t now;
-    int lost;
-    /* The most bytes that a write accepts, 0 for all; how often flush must be called. */
-    unsigned piece, drains, draining;
-} wire;
-
-static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    int16_t count = 0;
-
-    assert_true(capacity > 0);
-    if (wire.lost)
-        return -1;
-    while (count < capacity && wire.first < wire.last)
-        bytes[count++] = wire.arriving[wire.first++];
-    return count;
-}
-
-static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
-{
-    if (wire.piece && length > wire.piece)
-        length = (uint16_t)wire.piece;
-    memcpy(wire.sent + wire.length, bytes, length);
-    wire.length += length;
-    wire.draining = wire.drains;
-    return (int16_t)length;
-}
-
-static uint8_t wire_flush(void *context)
-{
-    if (wire.draining == 0)
-        return 1;
-    wire.draining--;
-    return 0;
-}
-
-static uint32_t wire_micros(void *context)
-{
-    return wire.now += 100;
-}
-
-static const mbm_port port = {
-    .read = wire_read, .write = wire_write, .micros = wire_micros, .flush = wire_flush};
+static hooked_port wire;
+static mbm_port port;
 
 static void reset(void)
 {
@@ -70,6 +25,8 @@ static void reset(void)
     memset(&diagnostics, 0, sizeof diagnostics);
     memset(&wire, 0, sizeof wire);
     memset(words, 0, sizeof words);
+    wire.step = 100;
+    port = hooked_port_of(&wire);
     unit.id = 17;
     table.words = words;
     table.size = 10;
@@ -80,10 +37,8 @@ fixture each_test = {reset, NULL};
 /* Lets the frame of a PDU arrive and polls. Returns the length of what was sent. */
 static size_t exchange(uint8_t to, const char *pdu, size_t length)
 {
-    wire.arriving[0] = to;
-    memcpy(wire.arriving + 1, pdu, length);
-    wire.first = wire.length = 0;
-    wire.last = seal(wire.arriving, length + 1);
+    wire.length = 0;
+    hooked_port_arrive_rtu(&wire, to, pdu, length);
     for (unsigned i = 0; i < 100; i++)
         OK(mbm_server_poll(&server));
     return wire.length;
@@ -118,28 +73,26 @@ TEST(a_unit_without_services_does_not_answer)
 }
 
 /* A peer that sends requests to another unit faster than they are read. */
+static char flood[] = "\0\1\0\0\0\6\x63\x03\0\0\0\1";
+
 static int16_t flooded_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
-    const char *request = (const char *)context;
-
     for (uint16_t i = 0; i < capacity; i++)
-        bytes[i] = (uint8_t)request[wire.first++ % 12];
+        bytes[i] = (uint8_t)flood[wire.first++ % 12];
     assert_true(wire.first < 12 * 1000);
     return (int16_t)capacity;
 }
 
 TEST(a_poll_ends_while_a_peer_floods)
 {
-    static char request[] = "\0\1\0\0\0\6\x63\x03\0\0\0\1";
     mbm_port flooded = port;
 
     flooded.read = flooded_read;
-    flooded.context = request;
     OK(mbm_server_beginTcp(&server, &flooded, &unit, 1, frame, sizeof frame));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 0);
-    request[6] = 17;
+    flood[6] = 17;
     wire.first = 0;
     OK(mbm_server_poll(&server));
     assert_int_equal(wire.length, 11);

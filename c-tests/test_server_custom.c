@@ -1,45 +1,18 @@
 /* User-defined functions among the other services of a unit. */
 #include "crc.h"
-#include "mbm.h"
+#include "hooked_port.h"
 #include "test.h"
 
 enum { UNIT = 17, HEAD = 7, FIRST_CODE = 65 };
 
-static struct {
-    uint8_t request[12], sent[MBM_MAX_TCP_FRAME];
-    /* Bytes of the request that have not been read yet. */
-    size_t left;
-    size_t length;
-} wire;
-
+static hooked_port wire;
+static mbm_port port;
 static mbm_server server;
 static mbm_unit unit;
 static mbm_registerTable table;
 static mbm_custom ours[MBM_MAX_SERVICES];
 static uint16_t words[4];
 static uint8_t frame[MBM_MAX_TCP_FRAME];
-
-static int16_t wire_read(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    size_t count = wire.left < capacity ? wire.left : capacity;
-    memcpy(bytes, wire.request + sizeof wire.request - wire.left, count);
-    wire.left -= count;
-    return (int16_t)count;
-}
-
-static int16_t wire_write(void *context, const uint8_t *bytes, uint16_t length)
-{
-    memcpy(wire.sent + wire.length, bytes, length);
-    wire.length += length;
-    return (int16_t)length;
-}
-
-static uint32_t wire_micros(void *context)
-{
-    return 0;
-}
-
-static const mbm_port port = {.read = wire_read, .write = wire_write, .micros = wire_micros};
 
 /* Responds with the number of its record. */
 static uint16_t serve(void *context, const mbm_request *request, uint8_t *response,
@@ -64,6 +37,7 @@ static void reset(void)
     memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
     memset(ours, 0, sizeof ours);
+    port = hooked_port_of(&wire);
     unit.id = UNIT;
     table.words = words;
     table.size = 4;
@@ -78,8 +52,7 @@ static int answers(uint8_t function)
 {
     const uint8_t request[] = {0, 1, 0, 0, 0, 6, UNIT, function, 0, 0, 0, 1};
 
-    memcpy(wire.request, request, sizeof request);
-    wire.left = sizeof wire.request;
+    hooked_port_arrive(&wire, request, sizeof request);
     wire.length = 0;
     OK(mbm_server_poll(&server));
     assert_true(wire.length > HEAD + 1);
@@ -227,8 +200,7 @@ TEST(a_function_that_was_pending_may_decline_then)
     add_declining(0, 3);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     declining.reply = MBM_REPLY_PENDING;
-    wire.left = sizeof wire.request;
-    memcpy(wire.request, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
+    hooked_port_arrive(&wire, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
     wire.length = 0;
     OK(mbm_server_poll(&server));
     OK(mbm_server_poll(&server));
@@ -260,8 +232,7 @@ TEST(a_decline_with_other_bits_is_exception_04)
     add_declining(0, 3);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     declining.reply = MBM_REPLY_DECLINED | 1;
-    memcpy(wire.request, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
-    wire.left = sizeof wire.request;
+    hooked_port_arrive(&wire, "\0\1\0\0\0\6\x11\3\0\0\0\1", 12);
     wire.length = 0;
     OK(mbm_server_poll(&server));
     assert_memory_equal(wire.sent + HEAD, "\x83\4", 2);
@@ -269,16 +240,12 @@ TEST(a_decline_with_other_bits_is_exception_04)
 
 TEST(a_function_gets_the_connection_of_its_request)
 {
-    int connection;
-    mbm_port own = port;
     uint8_t request[MBM_MAX_FRAME] = {UNIT, FIRST_CODE, 7};
     uint16_t length;
 
     add_declining(0, FIRST_CODE);
-    own.context = &connection;
-    OK(mbm_server_beginTcp(&server, &own, &unit, 1, frame, sizeof frame));
     assert_int_equal(answers(FIRST_CODE), -2);
-    assert_ptr_equal(declining.connection, &connection);
+    assert_ptr_equal(declining.connection, &wire);
     assert_int_equal(declining.unit, UNIT);
     assert_int_equal(declining.function, FIRST_CODE);
     seal(request, 3);

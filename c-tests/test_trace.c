@@ -444,3 +444,45 @@ TEST(an_event_of_a_sniffer_becomes_a_record)
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(NULL, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(&event, NULL));
 }
+
+/* --- a server behind a trace --- */
+
+/* A hook gets the trace as its connection, which is the first member here. */
+static struct traced {
+    mbm_trace trace;
+    hooked_port *wire;
+} traced;
+
+static const hooked_port *accessed;
+
+static void no_port_within(void *context, const mbm_traceRecord *record)
+{
+    assert_null(mbm_trace_port((mbm_trace *)context));
+}
+
+static uint8_t before_read(void *context, const mbm_access *access)
+{
+    accessed = ((const struct traced *)access->connection)->wire;
+    return 0;
+}
+
+TEST(a_hook_finds_its_connection_behind_a_trace)
+{
+    static const mbm_accessHooks hooks = {.beforeRead = before_read};
+    static const mbm_framing rtu = {.kind = MBM_FRAMING_RTU};
+
+    unit.id = 17;
+    table.words = words;
+    table.size = 1;
+    traced.wire = &wire;
+    OK(mbm_registerTable_setHooks(&table, &hooks));
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(mbm_trace_begin(&traced.trace, MBM_PACKET_RESPONSE, &port, &rtu, buffer, sizeof buffer,
+                       no_port_within, &traced.trace));
+    OK(mbm_server_beginRtu(&server, mbm_trace_port(&traced.trace), &unit, 1, frame, sizeof frame));
+    hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
+    for (int polls = 0; polls < 100 && wire.length == 0; polls++)
+        OK(mbm_server_poll(&server));
+    assert_int_equal(wire.length, 7);
+    assert_ptr_equal(accessed, &wire);
+}

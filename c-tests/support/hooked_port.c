@@ -1,8 +1,7 @@
 #include "hooked_port.h"
 
 #include "crc.h"
-
-#include <string.h>
+#include "test.h"
 
 static hooked_port *call(void *context, int hook)
 {
@@ -19,6 +18,7 @@ static int16_t hooked_read(void *context, uint8_t *bytes, uint16_t capacity)
     hooked_port *p = call(context, HOOK_READ);
     size_t count = p->last - p->first;
 
+    assert_in_range(capacity, 1, INT16_MAX);
     if (p->lost)
         return -1;
     if (count > capacity)
@@ -34,8 +34,11 @@ static int16_t hooked_write(void *context, const uint8_t *bytes, uint16_t length
 
     if (p->lost)
         return -1;
+    if (p->piece && length > p->piece)
+        length = (uint16_t)p->piece;
     if (p->length + length > sizeof p->sent)
         p->length = 0;
+    p->draining = p->drains;
     memcpy(p->sent + p->length, bytes, length);
     p->length += length;
     return (int16_t)length;
@@ -50,8 +53,12 @@ static uint32_t hooked_micros(void *context)
 
 static uint8_t hooked_flush(void *context)
 {
-    call(context, HOOK_FLUSH);
-    return 1;
+    hooked_port *p = call(context, HOOK_FLUSH);
+
+    if (p->draining == 0)
+        return 1;
+    p->draining--;
+    return 0;
 }
 
 static void hooked_pre(void *context)

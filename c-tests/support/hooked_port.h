@@ -14,6 +14,8 @@ typedef struct hooked_port {
     size_t first, last, length;
     uint32_t now, step; /* each read of the clock takes `step` microseconds */
     uint8_t lost;       /* 1: the link is lost */
+    /* The most bytes that a write accepts, 0 for all; how often flush must be called. */
+    unsigned piece, drains, draining;
     void (*within)(int hook);
     unsigned called[HOOKS];
 } hooked_port;
