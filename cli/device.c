@@ -67,6 +67,7 @@ void device_free(device *into)
         free(field->unit_of_measurement);
         free(field->description);
         free(field->words);
+        free(field->press);
     }
     free(into->fields);
     free(into->planned);

@@ -48,6 +48,10 @@ typedef struct device_field {
     uint16_t *words;        /* its value: as many as device_size; NULL if the file gives none */
     device_label *labels;
     uint16_t label_count;
+    /* For Home Assistant; see home.h. */
+    const char *device_class; /* NULL: that of the unit of measurement; "none" for none */
+    uint8_t has_state_class, state_class;
+    char *press;          /* what a button writes; NULL: it is none */
     int line, scale_line; /* of the file */
 } device_field;
 

@@ -5,6 +5,7 @@
 #include "device_file.h"
 
 #include "device_address.h"
+#include "device_home.h"
 #include "device_limits.h"
 #include "device_names.h"
 #include "device_repeat.h"
@@ -51,14 +52,18 @@ enum {
     ENUMERATION,
     WRITE_FUNCTION,
     FIELD_REPEAT,
+    DEVICE_CLASS,
+    STATE_CLASS,
+    PRESS,
     FIELD_KEYS
 };
 static const char *const FIELD_NAMES[] = {
-    "name",   "table",       "address",     "type",
-    "bit",    "count",       "scale",       "unit_of_measurement",
-    "access", "interval",    "value",       "unit",
-    "order",  "description", "enumeration", "write_function",
-    "repeat", NULL};
+    "name",   "table",        "address",     "type",
+    "bit",    "count",        "scale",       "unit_of_measurement",
+    "access", "interval",     "value",       "unit",
+    "order",  "description",  "enumeration", "write_function",
+    "repeat", "device_class", "state_class", "press",
+    NULL};
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
@@ -507,6 +512,8 @@ static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_
            read_scale(file, values[SCALE], planned, field) &&
            read_value(file, values[VALUE], planned, field) &&
            read_enumeration(file, values[ENUMERATION], planned, field) &&
+           device_home_read(file, values[DEVICE_CLASS], values[STATE_CLASS], values[PRESS], planned,
+                            field) &&
            check_others(file, node, into);
 }
 

@@ -3,13 +3,14 @@
  * Licence: MIT OR Apache-2.0. */
 #include "discovery.h"
 
+#include "home.h"
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { LONGEST_STATE = 255, TOPIC_BYTES = 512, ID_BYTES = 300 };
+enum { TOPIC_BYTES = 512, ID_BYTES = 300 };
 
 /* --- names --- */
 
@@ -45,50 +46,9 @@ static void line_id(const discovery_line *line, char id[ID_BYTES])
     write_id(text, id);
 }
 
-/* --- which entity a field is --- */
-
-static int is_text(const mbm_planField *planned)
-{
-    return planned->type == MBM_TYPE_TEXT;
-}
-
-/* Whether it is one bit, one number or several values. */
-static int is_bit(const mbm_planField *planned)
-{
-    return planned->type == MBM_TYPE_BIT && planned->count == 1;
-}
-
-static int is_several(const mbm_planField *planned)
-{
-    return !is_text(planned) && !device_is_part(planned) && planned->count > 1;
-}
-
-/* Whether its numbers have names, which Home Assistant shows. The numbers of an enumeration have no
- * scale. */
-static int has_names(const device *of, uint16_t field)
-{
-    const device_field *one = &of->fields[field];
-    const mbm_planField *planned = &of->planned[field];
-
-    return one->label_count > 0 && one->form.scale.digits == 0 && !is_bit(planned) &&
-           !is_several(planned);
-}
-
 static const char *component_of(const device *of, uint16_t field)
 {
-    const mbm_planField *planned = &of->planned[field];
-    const int is_written = of->fields[field].access & DEVICE_WRITE;
-
-    /* Several values are a text if they are written: Home Assistant has no list of numbers. */
-    if (is_several(planned))
-        return is_written ? "text" : "sensor";
-    if (is_text(planned))
-        return is_written && planned->count <= LONGEST_STATE ? "text" : "sensor";
-    if (is_bit(planned))
-        return is_written ? "switch" : "binary_sensor";
-    if (is_written && has_names(of, field))
-        return "select";
-    return is_written ? "number" : "sensor";
+    return home_components[home_component(&of->fields[field], &of->planned[field])];
 }
 
 void discovery_topic(const discovery_line *line, const device *of, uint16_t field,
@@ -207,10 +167,10 @@ static void add_device(cJSON *to, const discovery_line *line, const device *of,
 static const char *template_of(const mbm_planField *planned, int is_plain)
 {
     if (is_plain)
-        return is_several(planned) ? "{{ value[:255] }}" : NULL;
-    if (is_several(planned))
+        return home_is_several(planned) ? "{{ value[:255] }}" : NULL;
+    if (home_is_several(planned))
         return "{{ ((value_json.value or []) | join(','))[:255] }}";
-    if (is_text(planned))
+    if (planned->type == MBM_TYPE_TEXT)
         return "{{ value_json.value or '' }}";
     return "{{ value_json.value }}";
 }
@@ -261,46 +221,75 @@ static void add_names(cJSON *to, const char *key, const device_field *one, looku
     free(text);
 }
 
-static void add_options(cJSON *to, const device_field *one, const char *component)
+static void add_options(cJSON *to, const device_field *one)
 {
     cJSON *list = cJSON_AddArrayToObject(to, "options");
     uint16_t i;
 
     for (i = 0; i < one->label_count; i++)
         cJSON_AddItemToArray(list, cJSON_CreateString(one->labels[i].name));
-    if (strcmp(component, "sensor") == 0)
-        cJSON_AddStringToObject(to, "device_class", "enum");
+}
+
+/* Adds the classes of an entity, its unit, and the names of its numbers. */
+static void add_class(cJSON *to, const device_field *one, const mbm_planField *planned)
+{
+    const int component = home_component(one, planned), state = home_state_of(one, planned);
+    const char *name = home_class_of(one, planned);
+
+    if (component == HOME_SENSOR && home_has_names(one, planned))
+        name = "enum";
+    if (name)
+        cJSON_AddStringToObject(to, "device_class", name);
+    if (state != HOME_NO_STATE)
+        cJSON_AddStringToObject(to, "state_class", home_states[state]);
+    if (component != HOME_BUTTON && home_has_names(one, planned))
+        add_options(to, one);
+    else if (one->unit_of_measurement && home_is_number(one, planned) &&
+             (component == HOME_SENSOR || component == HOME_NUMBER))
+        cJSON_AddStringToObject(to, "unit_of_measurement", one->unit_of_measurement);
+}
+
+/* Adds what a button sends: the value, of a text as a JSON string. */
+static void add_press(cJSON *to, const device_field *one, const mbm_planField *planned)
+{
+    cJSON *string = cJSON_CreateString(one->press);
+    char *literal = cJSON_PrintUnformatted(string);
+
+    if (literal)
+        cJSON_AddStringToObject(to, "payload_press",
+                                planned->type == MBM_TYPE_TEXT ? literal : one->press);
+    cJSON_free(literal);
+    cJSON_Delete(string);
 }
 
 /* --- state and command --- */
 
-static void add_state(cJSON *to, const discovery_line *line, const device *of, uint16_t field,
-                      const char *component)
+static void add_state(cJSON *to, const discovery_line *line, const device *of, uint16_t field)
 {
     const mbm_planField *planned = &of->planned[field];
+    const int component = home_component(&of->fields[field], planned);
     const char *how = template_of(planned, line->is_plain);
     const char *on = line->is_plain ? "1" : "True", *off = line->is_plain ? "0" : "False";
 
     if (field >= of->readable)
         return;
     add_topic(to, "state_topic", line, of->fields[field].topic, "");
-    if (has_names(of, field))
+    if (home_has_names(&of->fields[field], &of->planned[field]))
         /* Home Assistant shows a number without a name as unknown. */
         add_names(to, "value_template", &of->fields[field], line->is_plain ? BY_TEXT : BY_NUMBER,
                   line->is_plain ? ".get(value)" : ".get(value_json.value)");
     else if (how)
         cJSON_AddStringToObject(to, "value_template", how);
-    if (strcmp(component, "switch") == 0) {
+    if (component == HOME_SWITCH) {
         cJSON_AddStringToObject(to, "state_on", on);
         cJSON_AddStringToObject(to, "state_off", off);
-    } else if (strcmp(component, "binary_sensor") == 0) {
+    } else if (component == HOME_BINARY_SENSOR) {
         cJSON_AddStringToObject(to, "payload_on", on);
         cJSON_AddStringToObject(to, "payload_off", off);
     }
 }
 
-static void add_command(cJSON *to, const discovery_line *line, const device *of, uint16_t field,
-                        const char *component)
+static void add_command(cJSON *to, const discovery_line *line, const device *of, uint16_t field)
 {
     const device_field *one = &of->fields[field];
     const mbm_planField *planned = &of->planned[field];
@@ -308,25 +297,27 @@ static void add_command(cJSON *to, const discovery_line *line, const device *of,
     if (!(one->access & DEVICE_WRITE))
         return;
     add_topic(to, "command_topic", line, one->topic, "/set");
-    if (strcmp(component, "number") == 0)
-        add_range(to, one, planned);
-    else if (strcmp(component, "select") == 0)
-        add_names(to, "command_template", one, BY_NAME, "[value]");
-    else if (strcmp(component, "switch") == 0) {
+    switch (home_component(one, planned)) {
+    case HOME_NUMBER: add_range(to, one, planned); return;
+    case HOME_SELECT: add_names(to, "command_template", one, BY_NAME, "[value]"); return;
+    case HOME_BUTTON: add_press(to, one, planned); return;
+    case HOME_SWITCH:
         cJSON_AddStringToObject(to, "payload_on", "ON");
         cJSON_AddStringToObject(to, "payload_off", "OFF");
-    } else if (is_text(planned)) {
-        cJSON_AddNumberToObject(to, "max", planned->count);
-        /* A JSON string is the text, whatever its first character is. */
-        cJSON_AddStringToObject(to, "command_template", "{{ value | to_json }}");
+        return;
+    default: break;
     }
+    if (planned->type != MBM_TYPE_TEXT)
+        return;
+    cJSON_AddNumberToObject(to, "max", planned->count);
+    /* A JSON string is the text, whatever its first character is. */
+    cJSON_AddStringToObject(to, "command_template", "{{ value | to_json }}");
 }
 
 char *discovery_config(const discovery_line *line, const device *of, uint16_t field,
                        char topic[DISCOVERY_TOPIC_BYTES])
 {
     const device_field *one = &of->fields[field];
-    const char *component = component_of(of, field);
     cJSON *root = cJSON_CreateObject(), *origin;
     char node[ID_BYTES], id[DISCOVERY_TOPIC_BYTES];
     char *text;
@@ -336,15 +327,9 @@ char *discovery_config(const discovery_line *line, const device *of, uint16_t fi
     snprintf(id, sizeof id, "mbm_%s_%s", node, one->identifier);
     cJSON_AddStringToObject(root, "name", one->name);
     cJSON_AddStringToObject(root, "unique_id", id);
-    add_state(root, line, of, field, component);
-    add_command(root, line, of, field, component);
-    if (has_names(of, field))
-        add_options(root, one, component);
-    else if (one->unit_of_measurement &&
-             (strcmp(component, "number") == 0 ||
-              (strcmp(component, "sensor") == 0 && !is_text(&of->planned[field]) &&
-               !is_several(&of->planned[field]))))
-        cJSON_AddStringToObject(root, "unit_of_measurement", one->unit_of_measurement);
+    add_state(root, line, of, field);
+    add_command(root, line, of, field);
+    add_class(root, one, &of->planned[field]);
     add_availability(root, line, of, &of->planned[field]);
     add_device(root, line, of, &of->planned[field]);
     origin = cJSON_AddObjectToObject(root, "origin");

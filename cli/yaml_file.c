@@ -345,7 +345,7 @@ int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping
         values[index] = pair.value;
     }
     for (index = 0; names[index]; index++)
-        if ((needed >> index & 1) && !values[index])
+        if (index < 32 && (needed >> index & 1) && !values[index])
             return yaml_file_refuse(file, mapping, "%s has no key %s", what, names[index]);
     return 1;
 }

@@ -45,8 +45,8 @@ int yaml_file_refuse_line(yaml_file *file, int line, const char *format, ...)
 int yaml_file_fail(yaml_file *file, int error);
 
 /* Sorts the values of a mapping by their keys: values[i] is that of names[i], NULL without one. The
- * names end with NULL. If bit i of `needed` is set, the key names[i] must be there. Returns 0 after
- * a refusal: `what` names the mapping there, such as "the line". */
+ * names end with NULL. If bit i of `needed` is set, the key names[i] must be there: one of the
+ * first 32. Returns 0 after a refusal: `what` names the mapping there, such as "the line". */
 int yaml_file_keys(yaml_file *file, const char *what, const yaml_node_t *mapping,
                    const char *const *names, uint32_t needed, const yaml_node_t **values);
 

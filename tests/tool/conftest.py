@@ -8,7 +8,7 @@ import types
 import pytest
 
 sys.dont_write_bytecode = True
-pytest.register_assert_rewrite("peers", "services")
+pytest.register_assert_rewrite("home", "peers", "services")
 import peers  # noqa: E402
 from peers import BUILD, DONE, PATIENT, Program, SerialDevice, TcpDevice, Wire, run  # noqa: E402
 

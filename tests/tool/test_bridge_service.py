@@ -8,6 +8,7 @@ import signal
 import time
 
 import pytest
+from home import component_of
 from peers import ROOT, WRONG, TcpDevice, wait
 from services import Broker, Notified, Subscriber, metrics
 
@@ -332,41 +333,6 @@ fields:
 - {name: reset, table: coils, address: 1, access: write}
 - {name: other, unit: 4, table: holding, address: 0, type: double, access: write}
 """
-
-# The schemas of Home Assistant's documentation of MQTT entities: the keys that a component may have, and their types.
-COMMON = {"name": str, "unique_id": str, "availability": list, "availability_mode": str, "device": dict, "origin": dict,
-          "state_topic": str, "value_template": str}
-SCHEMAS = {
-    "sensor": ({"unit_of_measurement": str, "device_class": str, "options": list}, {"state_topic"}),
-    "select": ({"command_topic": str, "command_template": str, "options": list}, {"command_topic", "options"}),
-    "binary_sensor": ({"payload_on": str, "payload_off": str}, {"state_topic"}),
-    "switch": ({"command_topic": str, "payload_on": str, "payload_off": str, "state_on": str, "state_off": str}, {"command_topic"}),
-    "number": ({"command_topic": str, "min": float, "max": float, "step": float, "mode": str, "unit_of_measurement": str}, {"command_topic"}),
-    "text": ({"command_topic": str, "max": int, "command_template": str}, {"command_topic"}),
-}
-DEVICE = {"identifiers": list, "name": str, "model": str}
-TOPIC = re.compile(r"homeassistant/([a-z_]+)/[a-zA-Z0-9_-]+/[a-zA-Z0-9_-]+/config")
-
-
-def is_a(value, kind):
-    return isinstance(value, (int, float)) if kind is float else isinstance(value, kind)
-
-
-def component_of(topic, config):
-    """Checks a topic and its config as Home Assistant does. Returns the component."""
-    component = TOPIC.fullmatch(topic)[1]
-    optional, needed = SCHEMAS[component]
-    keys = {**COMMON, **optional}
-    assert all(key in keys and is_a(value, keys[key]) for key, value in config.items()), config
-    assert needed | {"unique_id", "device", "availability"} <= set(config), config
-    assert config["device"]["identifiers"] and all(key in DEVICE and is_a(value, DEVICE[key]) for key, value in config["device"].items())
-    assert all(set(one) == {"topic"} for one in config["availability"]) and config["availability_mode"] == "all"
-    if component == "number":
-        assert config["min"] < config["max"] and config["step"] >= 0.001 and config["mode"] == "box"
-    if component == "text" and "max" in config:
-        assert 0 < config["max"] <= 255
-    return component
-
 
 @pytest.fixture
 def heat(broker, begin, write):
