@@ -32,7 +32,7 @@ CLASSES = {
     "power_factor": ({"%", None}, MEASURES), "distance": ({"mm", "m"}, {*COUNTS, *MEASURES}), "duration": ({"s", "min", "h"}, {*COUNTS, *MEASURES}),
     "volume_flow_rate": ({"m\u00b3/h", "L/min"}, MEASURES), "water": ({"L", "m\u00b3"}, COUNTS),
 }
-OTHER_CLASSES = {"binary_sensor": {"running", "problem", "lock"}, "switch": {"outlet", "switch"}, "button": {"identify", "restart", "update"}}
+OTHER_CLASSES = {"binary_sensor": {"battery_charging", "lock", "problem", "running"}, "switch": {"outlet", "switch"}, "button": {"identify", "restart", "update"}}
 
 
 def is_a(value, kind):
