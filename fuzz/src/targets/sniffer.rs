@@ -14,13 +14,18 @@ pub fn run(data: &[u8]) {
     let framing = Framing::from_code(code).expect("one of four");
     let size = MIN_BUFFER + usize::from(input.u16() % 600);
     let piece = 1 + usize::from(input.u8());
+    let mut sniffer = Sniffer::new(framing);
+    if framing == Framing::Tcp {
+        sniffer.set_frame_timeout(FRAME_TIMEOUT);
+    }
     let mut bus = Bus {
         framing,
-        sniffer: Sniffer::new(framing),
+        sniffer,
         buffer: vec![0; size],
         now: 0u32.wrapping_sub(u32::from(input.u16())),
         line: Vec::new(),
         reported: 0,
+        fed: 0,
         requests: Vec::new(),
     };
     let Some(asked) = Asked::new(&mut input) else {
@@ -64,6 +69,9 @@ pub fn run(data: &[u8]) {
     );
 }
 
+/// How long the sniffer waits for the rest of a TCP frame, in microseconds.
+const FRAME_TIMEOUT: u32 = 1_000_000;
+
 struct Bus {
     framing: Framing,
     sniffer: Sniffer,
@@ -71,14 +79,21 @@ struct Bus {
     now: u32,
     /// All bytes so far.
     line: Vec<u8>,
-    /// How many of them events have reported.
+    /// How many of them events have reported, with those of a TCP frame that have not arrived yet.
     reported: usize,
+    /// When the last bytes arrived.
+    fed: u32,
     /// The unit and the function of every request.
     requests: Vec<(u8, u8)>,
 }
 
 impl Bus {
     fn feed(&mut self, bytes: &[u8]) {
+        // After such a silence the sniffer waits no more for the rest of a frame that it reported.
+        if self.now.wrapping_sub(self.fed) >= FRAME_TIMEOUT {
+            self.reported = self.reported.min(self.line.len());
+        }
+        self.fed = self.now;
         self.line.extend_from_slice(bytes);
         let mut rest = bytes;
         while !rest.is_empty() {
