@@ -2,226 +2,37 @@
  * limit the program has after which it cancels a request; and no unit waits for another. Prints the
  * third table of docs/reports/fault-table.md. On a simulated clock. */
 #include "faults.h"
-#include "sim.h"
+#include "reader.h"
 #include "test.h"
 
 fixture each_test = {sim_setup, sim_teardown};
 
 enum {
-    MS = 1000,
     TIMEOUT = 500 * MS,
     QUIET = 100 * MS,            /* the default quiet time */
     CLEAN = 2 * TIMEOUT + QUIET, /* the silence after which a unit owes nothing */
     GAP = 4 * MS,                /* the default gap */
-    PROMPT = 3 * MS,             /* what most devices take for a reply */
     EXCHANGE = 50 * MS,          /* more than a request, a reply and their gap take */
-    NEVER = 2000000000,          /* no limit */
-    UNIT = 17,
     OTHER = 3,
-    DEVICES = 8,
     ABSENT = 100 /* a unit without a device */
 };
 
-/* A device answers in order, in its time. Its requests are numbered from 1 on. */
-typedef struct device {
-    uint8_t unit;
-    uint32_t takes;
-    unsigned lost, losses;   /* the number of the first reply that is lost, and how many are */
-    unsigned late;           /* the number of the reply that is late */
-    uint32_t takes_for_late; /* what the device takes for it */
-    int8_t deviates;         /* how many registers more than requested its replies have */
-    uint8_t repeats_wrong;   /* 1: the reply to a write repeats another value */
-    unsigned requests;
-    uint64_t free; /* when its last reply has been sent */
-} device;
-
-typedef enum reader_kind { NODE_READS, CLIENT_READS, ASCII_CLIENT_READS, READERS } reader_kind;
-
-/* A line with devices, and the program that reads them. */
-typedef struct bench {
-    sim *s;
-    device devices[DEVICES];
-    unsigned count;
-    reader_kind kind;
-    mbm_client client;
-    uint8_t frame[MBM_MAX_ASCII_FRAME];
-    mbm_clientRequest request;
-    uint16_t word;
-} bench;
-
-static void answer(sim *s, const sim_frame *request)
-{
-    bench *b = (bench *)s->context;
-    uint8_t frame[300], asked[8];
-    device *d = NULL;
-
-    for (unsigned i = 0; i < b->count; i++)
-        if (b->devices[i].unit == request->bytes[0])
-            d = &b->devices[i];
-    if (!d || d->unit == 0)
-        return;
-    d->requests++;
-    if (d->requests >= d->lost && d->requests < d->lost + d->losses)
-        return;
-    memcpy(asked, request->bytes, sizeof asked);
-    if (asked[1] == 3)
-        asked[5] = (uint8_t)(asked[5] + d->deviates);
-    else if (d->repeats_wrong)
-        asked[5] ^= 0x55;
-    size_t length = fault_right_reply(frame, asked);
-    uint64_t at = (d->free > request->end ? d->free : request->end) +
-                  (d->requests == d->late ? d->takes_for_late : d->takes);
-    if (request->ascii)
-        sim_deliver_ascii(s, at, frame, length);
-    else
-        sim_deliver(s, at, frame, length);
-    d->free = at + 2 * length * s->character;
-}
-
-static device *add(bench *b, uint8_t unit, uint32_t takes)
-{
-    device *d = &b->devices[b->count++];
-
-    assert_true(b->count <= DEVICES);
-    memset(d, 0, sizeof *d);
-    d->unit = unit;
-    d->takes = takes;
-    return d;
-}
-
-/* Loses the next replies of a device. */
-static void lose(device *d, unsigned losses)
-{
-    d->lost = d->requests + 1;
-    d->losses = losses;
-}
-
-static void be_late(device *d, uint32_t takes)
-{
-    d->late = d->requests + 1;
-    d->takes_for_late = takes;
-}
-
-/* Begins on a line that has been silent for long. */
 static void begin(bench *b, sim *s, reader_kind kind)
 {
-    memset(b, 0, sizeof *b);
-    b->s = s;
-    b->kind = kind;
-    s->device = answer;
-    s->context = b;
-    s->limit = UINT64_C(1000000000000);
-    s->first = s->last = 0;
-    s->sent = 0;
-    s->now += 100000 * MS;
-    if (kind == CLIENT_READS)
-        OK(mbm_client_beginRtu(&b->client, &s->port, b->frame, MBM_MAX_FRAME));
-    else if (kind == ASCII_CLIENT_READS)
-        OK(mbm_client_beginAscii(&b->client, &s->port, b->frame, sizeof b->frame));
-    sim_begin(s, UNIT);
-    OK(mbm_node_setBlocking(&s->node, 0));
-    OK(mbm_node_setResponseTimeout(&s->node, TIMEOUT / MS));
-    if (kind != NODE_READS)
-        OK(mbm_client_setResponseTimeout(&b->client, TIMEOUT / MS));
-}
-
-static void set_timeout(bench *b, uint32_t timeout)
-{
-    OK(mbm_node_setResponseTimeout(&b->s->node, timeout / MS));
-    if (b->kind != NODE_READS)
-        OK(mbm_client_setResponseTimeout(&b->client, (uint16_t)(timeout / MS)));
-}
-
-static void set_quiet_time(bench *b, uint32_t ms)
-{
-    if (b->kind == NODE_READS)
-        OK(mbm_line_setQuietTime(&b->s->line, (uint16_t)ms));
-    else
-        OK(mbm_client_setQuietTime(&b->client, (uint16_t)ms));
-}
-
-/* Sleeps as a program would: until a byte arrives, for at most `delay`, and not beyond `end`. */
-static void sleep_until_a_byte(sim *s, uint32_t delay, uint64_t end)
-{
-    uint64_t until = s->now + (delay > 0 ? delay : 1);
-
-    if (s->first < s->last && s->incoming[s->first].at > s->now && s->incoming[s->first].at < until)
-        until = s->incoming[s->first].at;
-    s->now = until < end ? until : end;
-}
-
-static uint8_t starts(bench *b, uint8_t unit, uint16_t address)
-{
-    if (b->s->sent > SIM_FRAMES / 2 && b->s->frames[b->s->sent - 1].whole)
-        b->s->sent = 0;
-    if (b->kind == NODE_READS) {
-        OK(mbm_node_setSlaveID(&b->s->node, unit));
-        return mbm_node_readHoldingRegisters(&b->s->node, address, 1);
-    }
-    b->request.unit = unit;
-    b->request.reply = &b->word;
-    b->request.replyBytes = sizeof b->word;
-    return mbm_client_readHoldingRegisters(&b->client, &b->request, address, 1);
-}
-
-static uint8_t polls(bench *b)
-{
-    if (b->kind == NODE_READS)
-        return mbm_node_poll(&b->s->node);
-    (void)mbm_client_poll(&b->client);
-    return b->request.status;
-}
-
-static uint32_t delay_of(bench *b)
-{
-    return b->kind == NODE_READS ? mbm_node_pollDelay(&b->s->node)
-                                 : mbm_client_pollDelay(&b->client);
-}
-
-static void cancels(bench *b)
-{
-    if (b->kind == NODE_READS)
-        OK(mbm_node_cancel(&b->s->node));
-    else
-        OK(mbm_client_cancel(&b->client, &b->request));
-}
-
-/* Goes on with a request until it has ended, or until the limit: then it is pending. */
-static uint8_t goes_on(bench *b, uint16_t address, uint32_t limit)
-{
-    uint64_t end = b->s->now + limit;
-    uint8_t status;
-
-    while ((status = polls(b)) == MBM_PENDING && b->s->now < end)
-        sleep_until_a_byte(b->s, delay_of(b), end);
-    if (status == MBM_OK)
-        assert_int_equal(b->kind == NODE_READS ? b->s->response[0] : b->word, fault_value(address));
-    return status;
-}
-
-/* Reads a register; gives up after the limit. A read that succeeds has the right value. */
-static uint8_t reads(bench *b, uint8_t unit, uint16_t address, uint32_t limit)
-{
-    IS(MBM_PENDING, starts(b, unit, address));
-    uint8_t status = goes_on(b, address, limit);
-    if (status == MBM_PENDING) {
-        cancels(b);
-        status = MBM_CANCELLED;
-    }
-    return status;
+    bench_begin(b, s, kind, TIMEOUT);
 }
 
 static void reads_well(bench *b, uint8_t unit, unsigned count)
 {
     while (count-- > 0)
-        OK(reads(b, unit, (uint16_t)(100 + count), EXCHANGE));
+        OK(bench_reads(b, unit, (uint16_t)(100 + count), EXCHANGE));
 }
 
 /* One reply is lost, and the program gives up after 20 ms. Returns when the request was sent. */
 static uint64_t loses_one(bench *b, device *d)
 {
-    lose(d, 1);
-    IS(MBM_CANCELLED, reads(b, d->unit, 9, 20 * MS));
+    device_loses(d, 1);
+    IS(MBM_CANCELLED, bench_reads(b, d->unit, 9, 20 * MS));
     return b->s->frames[b->s->sent - 1].begin;
 }
 
@@ -241,16 +52,16 @@ static unsigned time_to_the_first_value(sim *s, reader_kind kind, uint32_t limit
     uint8_t status;
 
     begin(&b, s, kind);
-    set_timeout(&b, timeout);
-    device *d = add(&b, UNIT, PROMPT);
+    bench_set_timeout(&b, timeout);
+    device *d = bench_add(&b, UNIT, PROMPT);
     for (i = 0; i < 10; i++)
-        OK(reads(&b, UNIT, i, limit));
-    lose(d, lost);
+        OK(bench_reads(&b, UNIT, i, limit));
+    device_loses(d, lost);
     began = well = s->now;
     do {
         uint64_t read = s->now;
 
-        status = reads(&b, UNIT, i++, limit);
+        status = bench_reads(&b, UNIT, i++, limit);
         if (d->requests < d->lost + lost)
             well = s->now;
         /* From the last loss on, the device answers. */
@@ -261,7 +72,7 @@ static unsigned time_to_the_first_value(sim *s, reader_kind kind, uint32_t limit
     began = (s->now - began + MS / 2) / MS;
     for (i = 0; i < 50; i++) {
         s->now += pause;
-        OK(reads(&b, UNIT, i, limit));
+        OK(bench_reads(&b, UNIT, i, limit));
     }
     return (unsigned)began;
 }
@@ -304,27 +115,24 @@ SIM_TEST(a_device_is_heard_again_whatever_limit_and_pause_a_program_has)
         (void)fclose(table);
 }
 
-/* A test that each kind of reader from `first` on passes. */
-#define READERS_TEST(name, first)                                                                  \
-    static void each_##name(sim *s, bench *b, int kind);                                           \
+/* A test that each kind of reader from `first` to `last` passes, with each of these values. */
+#define BENCH_TEST(name, first, last, ...)                                                         \
+    static void each_##name(sim *s, bench *b, int kind, uint32_t with);                            \
     SIM_TEST(name)                                                                                 \
     {                                                                                              \
+        static const uint32_t with[] = {__VA_ARGS__};                                              \
         bench b;                                                                                   \
                                                                                                    \
-        for (int kind = first; kind < READERS; kind++) {                                           \
-            begin(&b, s, (reader_kind)kind);                                                       \
-            each_##name(s, &b, kind);                                                              \
-        }                                                                                          \
+        for (int kind = first; kind <= last; kind++)                                               \
+            for (unsigned i = 0; i < COUNT(with); i++) {                                           \
+                begin(&b, s, (reader_kind)kind);                                                   \
+                each_##name(s, &b, kind, with[i]);                                                 \
+            }                                                                                      \
     }                                                                                              \
-    static void each_##name(__attribute__((unused)) sim *s, bench *b,                              \
-                            __attribute__((unused)) int kind)
-
-/* Declares a bench and its kind of reader. */
-#define BENCH                                                                                      \
-    int kind;                                                                                      \
-    bench b;                                                                                       \
-    sim *s = sim_of_test()
-#define BEGIN begin(&b, s, (reader_kind)kind)
+    static void each_##name(__attribute__((unused)) sim *s, bench *b, int kind, uint32_t with)
+#define READERS_TEST(name, first) BENCH_TEST(name, first, READERS - 1, 0)
+/* A node reads; the program gives up the first request after 50 ms, or waits in vain. */
+#define NODE_TEST(name) BENCH_TEST(name, NODE_READS, NODE_READS, 50 * MS, (uint32_t)NEVER)
 
 /* Cancelled while it waits for the gap. */
 READERS_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing, NODE_READS)
@@ -333,12 +141,12 @@ READERS_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing, 
 
     if (kind == ASCII_CLIENT_READS)
         OK(mbm_client_setGap(&b->client, GAP));
-    add(b, UNIT, PROMPT);
+    bench_add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 1);
     sent = s->sent;
-    IS(MBM_CANCELLED, reads(b, UNIT, 1, GAP / 2));
+    IS(MBM_CANCELLED, bench_reads(b, UNIT, 1, GAP / 2));
     assert_int_equal(s->sent, sent);
-    OK(reads(b, UNIT, 2, EXCHANGE));
+    OK(bench_reads(b, UNIT, 2, EXCHANGE));
     assert_int_equal(s->sent, sent + 1);
     sim_assert_time(s->frames[sent].silence, GAP);
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
@@ -346,17 +154,17 @@ READERS_TEST(a_request_that_is_cancelled_before_its_frame_left_changes_nothing, 
 
 READERS_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_nothing, NODE_READS)
 {
-    add(b, UNIT, PROMPT);
+    bench_add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 1);
     s->now += EXCHANGE;
     s->write_piece = 5;
     s->write_busy = 1;
-    IS(MBM_PENDING, starts(b, UNIT, 1));
+    IS(MBM_PENDING, bench_starts(b, UNIT, 1));
     while (s->sent < 2) {
-        IS(MBM_PENDING, polls(b));
+        IS(MBM_PENDING, bench_polls(b));
         s->now += 10;
     }
-    cancels(b);
+    bench_cancels(b);
     s->write_piece = s->write_busy = 0;
     reads_well(b, UNIT, 2);
     assert_false(s->frames[1].whole);
@@ -367,12 +175,12 @@ READERS_TEST(a_request_that_is_cancelled_in_the_middle_of_its_frame_changes_noth
 /* Like a program that looks in each round whether the unit is there again. */
 READERS_TEST(requests_that_are_cancelled_while_they_wait_make_the_wait_no_longer, NODE_READS)
 {
-    uint64_t sent = loses_one(b, add(b, UNIT, PROMPT));
+    uint64_t sent = loses_one(b, bench_add(b, UNIT, PROMPT));
     unsigned count = s->sent;
     while (s->now < sent + CLEAN - 60 * MS)
-        IS(MBM_CANCELLED, reads(b, UNIT, 1, 30 * MS));
+        IS(MBM_CANCELLED, bench_reads(b, UNIT, 1, 30 * MS));
     assert_int_equal(s->sent, count);
-    OK(reads(b, UNIT, 2, 2 * EXCHANGE));
+    OK(bench_reads(b, UNIT, 2, 2 * EXCHANGE));
     assert_in_range(s->frames[count].begin - sent, CLEAN, CLEAN + 20 * MS);
     reads_well(b, UNIT, 20);
 }
@@ -383,10 +191,10 @@ READERS_TEST(a_request_that_waits_does_not_stop_the_clients_queue, CLIENT_READS)
     uint16_t word = 0;
     uint64_t began;
 
-    add(b, OTHER, PROMPT);
-    uint64_t sent = loses_one(b, add(b, UNIT, PROMPT));
+    bench_add(b, OTHER, PROMPT);
+    uint64_t sent = loses_one(b, bench_add(b, UNIT, PROMPT));
     s->now += QUIET;
-    IS(MBM_PENDING, starts(b, UNIT, 1));
+    IS(MBM_PENDING, bench_starts(b, UNIT, 1));
     other.unit = OTHER;
     other.reply = &word;
     other.replyBytes = sizeof word;
@@ -418,33 +226,29 @@ static void begin_second(sim *s, uint8_t unit)
     OK(mbm_node_setResponseTimeout(&second, TIMEOUT / MS));
 }
 
-TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node)
+BENCH_TEST(a_request_of_a_node_that_waits_gives_way_to_that_of_another_node, NODE_READS, NODE_READS,
+           0, 1)
 {
     uint64_t sent, began;
-    BENCH;
 
-    kind = NODE_READS;
-    for (int blocks = 0; blocks < 2; blocks++) {
-        BEGIN;
-        begin_second(s, OTHER);
-        OK(mbm_node_setBlocking(&second, (uint8_t)blocks));
-        add(&b, OTHER, PROMPT);
-        sent = loses_one(&b, add(&b, UNIT, PROMPT));
-        IS(MBM_PENDING, starts(&b, UNIT, 1));
-        IS(MBM_PENDING, goes_on(&b, 1, 2 * QUIET));
-        began = s->now;
-        IS(blocks ? MBM_OK : MBM_PENDING, mbm_node_readHoldingRegisters(&second, 5, 1));
-        IS(MBM_CANCELLED, polls(&b));
-        IS(MBM_CANCELLED, mbm_node_status(&s->node));
-        while (mbm_node_poll(&second) == MBM_PENDING)
-            sleep_until_a_byte(s, mbm_node_pollDelay(&second), UINT64_MAX);
-        OK(mbm_node_status(&second));
-        assert_int_equal(second_word, fault_value(5));
-        assert_in_range(s->now - began, 0, EXCHANGE);
-        /* It changed nothing for the node that gave way. */
-        OK(reads(&b, UNIT, 2, NEVER));
-        assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + MS);
-    }
+    begin_second(s, OTHER);
+    OK(mbm_node_setBlocking(&second, (uint8_t)with));
+    bench_add(b, OTHER, PROMPT);
+    sent = loses_one(b, bench_add(b, UNIT, PROMPT));
+    IS(MBM_PENDING, bench_starts(b, UNIT, 1));
+    IS(MBM_PENDING, bench_goes_on(b, 1, 2 * QUIET));
+    began = s->now;
+    IS(with ? MBM_OK : MBM_PENDING, mbm_node_readHoldingRegisters(&second, 5, 1));
+    IS(MBM_CANCELLED, bench_polls(b));
+    IS(MBM_CANCELLED, mbm_node_status(&s->node));
+    while (mbm_node_poll(&second) == MBM_PENDING)
+        sleep_until_a_byte(s, mbm_node_pollDelay(&second), UINT64_MAX);
+    OK(mbm_node_status(&second));
+    assert_int_equal(second_word, fault_value(5));
+    assert_in_range(s->now - began, 0, EXCHANGE);
+    /* It changed nothing for the node that gave way. */
+    OK(bench_reads(b, UNIT, 2, NEVER));
+    assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + MS);
 }
 
 static unsigned refused;
@@ -458,15 +262,11 @@ static void try_the_second_node(sim *s)
     refused++;
 }
 
-TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way)
+BENCH_TEST(a_request_of_a_blocking_node_that_waits_does_not_give_way, NODE_READS, NODE_READS, 0)
 {
-    BENCH;
-
-    kind = NODE_READS;
-    BEGIN;
     begin_second(s, OTHER);
-    add(&b, OTHER, PROMPT);
-    uint64_t sent = loses_one(&b, add(&b, UNIT, PROMPT));
+    bench_add(b, OTHER, PROMPT);
+    uint64_t sent = loses_one(b, bench_add(b, UNIT, PROMPT));
     OK(mbm_node_setBlocking(&s->node, 1));
     refused = 0;
     s->on_idle = try_the_second_node;
@@ -484,12 +284,12 @@ READERS_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once, NODE_READ
 {
     uint64_t sent;
 
-    device *d = add(b, UNIT, PROMPT);
+    device *d = bench_add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 3);
-    be_late(d, TIMEOUT + 200 * MS);
-    IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
+    device_is_late(d, TIMEOUT + 200 * MS);
+    IS(MBM_CANCELLED, bench_reads(b, UNIT, 1, 50 * MS));
     sent = s->frames[s->sent - 1].end;
-    OK(reads(b, UNIT, 2, NEVER));
+    OK(bench_reads(b, UNIT, 2, NEVER));
     assert_in_range(s->frames[s->sent - 1].begin - sent, TIMEOUT + 200 * MS,
                     TIMEOUT + 200 * MS + EXCHANGE);
     reads_well(b, UNIT, 50);
@@ -498,120 +298,92 @@ READERS_TEST(a_late_reply_lets_the_request_that_waits_be_sent_at_once, NODE_READ
 /* It comes within the quiet time. */
 READERS_TEST(a_reply_soon_after_its_request_was_cancelled_makes_no_later_one_wait, NODE_READS)
 {
-    device *d = add(b, UNIT, PROMPT);
-    be_late(d, 60 * MS);
-    IS(MBM_CANCELLED, reads(b, UNIT, 1, 40 * MS));
-    OK(reads(b, UNIT, 2, 2 * EXCHANGE));
+    device *d = bench_add(b, UNIT, PROMPT);
+    device_is_late(d, 60 * MS);
+    IS(MBM_CANCELLED, bench_reads(b, UNIT, 1, 40 * MS));
+    OK(bench_reads(b, UNIT, 2, 2 * EXCHANGE));
     reads_well(b, UNIT, 50);
 }
 
 READERS_TEST(a_late_reply_that_comes_while_another_unit_is_asked_counts_as_well, NODE_READS)
 {
-    device *d = add(b, UNIT, PROMPT);
-    add(b, OTHER, 400 * MS);
-    be_late(d, 300 * MS);
-    IS(MBM_CANCELLED, reads(b, UNIT, 1, 50 * MS));
-    OK(reads(b, OTHER, 2, NEVER));
+    device *d = bench_add(b, UNIT, PROMPT);
+    bench_add(b, OTHER, 400 * MS);
+    device_is_late(d, 300 * MS);
+    IS(MBM_CANCELLED, bench_reads(b, UNIT, 1, 50 * MS));
+    OK(bench_reads(b, OTHER, 2, NEVER));
     assert_in_range(s->now, d->free, d->free + TIMEOUT);
-    OK(reads(b, UNIT, 3, EXCHANGE));
+    OK(bench_reads(b, UNIT, 3, EXCHANGE));
     reads_well(b, UNIT, 50);
 }
 
-static const uint8_t alike[] = {33, 65, 97, 129, 225, 255};
+/* Units with the same last five bits as unit 1 or 31. */
+#define ALIKE_TEST(name) BENCH_TEST(name, NODE_READS, READERS - 1, 33, 65, 97, 129, 225, 255)
 
 /* The reply of unit 1 comes 700 ms after its timeout, and the other unit is read in between. */
-TEST(units_with_the_same_last_five_bits_share_no_memory)
+ALIKE_TEST(units_with_the_same_last_five_bits_share_no_memory)
 {
-    BENCH;
+    const uint8_t other = (uint8_t)with, unit = other == 255 ? 31 : 1;
+    device *d = bench_add(b, unit, 100 * MS);
 
-    for (kind = 0; kind < READERS; kind++)
-        for (unsigned i = 0; i < COUNT(alike); i++) {
-            const uint8_t unit = alike[i] == 255 ? 31 : 1;
-            device *d;
+    bench_add(b, other, 5 * MS);
+    for (uint16_t n = 0; n < 100; n++) {
+        const uint8_t status = bench_reads(b, unit, n, NEVER);
 
-            BEGIN;
-            d = add(&b, unit, 100 * MS);
-            add(&b, alike[i], 5 * MS);
-            for (uint16_t n = 0; n < 100; n++) {
-                const uint8_t status = reads(&b, unit, n, NEVER);
-
-                if (n == 1)
-                    be_late(d, 1200 * MS);
-                if (n == 10)
-                    lose(d, 1);
-                assert_true(status == MBM_OK || n == 2 || n == 3 || n == 11);
-                OK(reads(&b, alike[i], (uint16_t)(1000 + n), NEVER));
-            }
-        }
+        if (n == 1)
+            device_is_late(d, 1200 * MS);
+        if (n == 10)
+            device_loses(d, 1);
+        assert_true(status == MBM_OK || n == 2 || n == 3 || n == 11);
+        OK(bench_reads(b, other, (uint16_t)(1000 + n), NEVER));
+    }
 }
 
-TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
+ALIKE_TEST(a_unit_that_is_dead_delays_no_unit_with_the_same_last_five_bits)
 {
-    BENCH;
-
-    for (kind = 0; kind < READERS; kind++)
-        for (unsigned i = 0; i < COUNT(alike); i++)
-            for (int is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
-                BEGIN;
-                add(&b, alike[i], 5 * MS);
-                for (unsigned n = 0; n < 10; n++) {
-                    if (is_cancelled)
-                        IS(MBM_CANCELLED, reads(&b, 1, 0, 50 * MS));
-                    else
-                        IS(MBM_RESPONSE_TIMED_OUT, reads(&b, 1, 0, NEVER));
-                    OK(reads(&b, alike[i], 4, QUIET + EXCHANGE));
-                    reads_well(&b, alike[i], 5);
-                }
-            }
-}
-
-/* Each of them must know which requests the other one has cancelled, or waited for in vain. */
-TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
-{
-    static const uint32_t with[] = {50 * MS, NEVER};
-    BENCH;
-
-    kind = NODE_READS;
-    for (unsigned i = 0; i < COUNT(with); i++) {
-        device *d;
-
-        BEGIN;
-        begin_second(s, UNIT);
-        d = add(&b, UNIT, PROMPT);
-        be_late(d, TIMEOUT + 300 * MS);
-        assert_int_not_equal(reads(&b, UNIT, 1, with[i]), MBM_OK);
-        for (unsigned n = 2; n < 50; n++) {
-            OK(mbm_node_readHoldingRegisters(&second, (uint16_t)(500 + n), 1));
-            assert_int_equal(second_word, fault_value(500 + n));
-            OK(reads(&b, UNIT, (uint16_t)n, EXCHANGE));
+    for (int is_cancelled = 0; is_cancelled < 2; is_cancelled++) {
+        begin(b, s, (reader_kind)kind);
+        bench_add(b, (uint8_t)with, 5 * MS);
+        for (unsigned n = 0; n < 10; n++) {
+            if (is_cancelled)
+                IS(MBM_CANCELLED, bench_reads(b, 1, 0, 50 * MS));
+            else
+                IS(MBM_RESPONSE_TIMED_OUT, bench_reads(b, 1, 0, NEVER));
+            OK(bench_reads(b, (uint8_t)with, 4, QUIET + EXCHANGE));
+            reads_well(b, (uint8_t)with, 5);
         }
     }
 }
 
-TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply)
+/* Each of them must know which requests the other one has cancelled, or waited for in vain. */
+NODE_TEST(two_nodes_of_one_unit_know_of_each_others_late_replies)
 {
-    static const uint32_t with[] = {50 * MS, NEVER};
-    BENCH;
+    begin_second(s, UNIT);
+    device_is_late(bench_add(b, UNIT, PROMPT), TIMEOUT + 300 * MS);
+    assert_int_not_equal(bench_reads(b, UNIT, 1, with), MBM_OK);
+    for (unsigned n = 2; n < 50; n++) {
+        OK(mbm_node_readHoldingRegisters(&second, (uint16_t)(500 + n), 1));
+        assert_int_equal(second_word, fault_value(500 + n));
+        OK(bench_reads(b, UNIT, (uint16_t)n, EXCHANGE));
+    }
+}
 
-    kind = NODE_READS;
-    for (unsigned i = 0; i < COUNT(with); i++)
-        for (unsigned begins = 0; begins < 2; begins++) {
-            device *d;
-
-            BEGIN;
-            d = add(&b, UNIT, PROMPT);
-            add(&b, OTHER, PROMPT);
-            be_late(d, TIMEOUT + 300 * MS);
-            assert_int_not_equal(reads(&b, UNIT, 1, with[i]), MBM_OK);
-            if (begins)
-                sim_node(s, OTHER);
-            /* Its new unit is clean. */
-            OK(reads(&b, OTHER, 2, QUIET + EXCHANGE));
-            if (begins)
-                sim_node(s, UNIT);
-            OK(reads(&b, UNIT, 3, NEVER));
-            reads_well(&b, UNIT, 50);
-        }
+NODE_TEST(a_node_that_has_changed_its_unit_does_not_forget_the_late_reply)
+{
+    for (unsigned begins = 0; begins < 2; begins++) {
+        begin(b, s, (reader_kind)kind);
+        device_is_late(bench_add(b, UNIT, PROMPT), TIMEOUT + 300 * MS);
+        bench_add(b, OTHER, PROMPT);
+        assert_int_not_equal(bench_reads(b, UNIT, 1, with), MBM_OK);
+        if (begins)
+            sim_node(s, OTHER);
+        /* Its new unit is clean. */
+        OK(bench_reads(b, OTHER, 2, QUIET + EXCHANGE));
+        if (begins)
+            sim_node(s, UNIT);
+        OK(bench_reads(b, UNIT, 3, NEVER));
+        reads_well(b, UNIT, 50);
+    }
 }
 
 /* Broadcasts 06, and returns after how long it left. */
@@ -627,7 +399,7 @@ static uint64_t broadcasts(bench *b)
         memset(&b->request, 0, sizeof b->request);
         IS(MBM_PENDING, mbm_client_writeSingleRegister(&b->client, &b->request, 1, word));
     }
-    OK(goes_on(b, 0, NEVER));
+    OK(bench_goes_on(b, 0, NEVER));
     assert_int_equal(b->s->frames[b->s->sent - 1].bytes[0], 0);
     return b->s->frames[b->s->sent - 1].begin - began;
 }
@@ -636,7 +408,7 @@ static void broadcast(bench *b)
 {
     const uint16_t before = b->word;
 
-    /* `goes_on` compares with the value of register 0. */
+    /* `bench_goes_on` compares with the value of register 0. */
     b->word = b->s->response[0] = fault_value(0);
     assert_in_range(broadcasts(b), 0, QUIET + GAP + MS);
     b->word = before;
@@ -645,10 +417,10 @@ static void broadcast(bench *b)
 /* Even if more units owe replies than are remembered one by one. */
 READERS_TEST(a_broadcast_does_not_wait_after_a_cancelled_request, NODE_READS)
 {
-    (void)loses_one(b, add(b, UNIT, PROMPT));
+    (void)loses_one(b, bench_add(b, UNIT, PROMPT));
     broadcast(b);
     for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
-        (void)reads(b, unit, 0, QUIET + 40 * MS);
+        (void)bench_reads(b, unit, 0, QUIET + 40 * MS);
     broadcast(b);
     /* And it lets no reply be late. */
     s->now += CLEAN;
@@ -660,118 +432,98 @@ READERS_TEST(a_broadcast_does_not_wait_after_a_cancelled_request, NODE_READS)
 /* More units than are remembered one by one. */
 READERS_TEST(a_healthy_unit_is_heard_again_after_requests_to_many_absent_ones, NODE_READS)
 {
-    add(b, UNIT, PROMPT);
+    bench_add(b, UNIT, PROMPT);
     reads_well(b, UNIT, 3);
     for (uint8_t unit = ABSENT; unit < ABSENT + 20; unit++)
-        (void)reads(b, unit, 0, QUIET + 40 * MS);
+        (void)bench_reads(b, unit, 0, QUIET + 40 * MS);
     uint64_t last = s->frames[s->sent - 1].begin;
-    while (reads(b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
+    while (bench_reads(b, UNIT, 1, QUIET + EXCHANGE) != MBM_OK)
         assert_true(s->now < last + UINT64_C(5) * TIMEOUT);
     reads_well(b, UNIT, 50);
 }
 
 READERS_TEST(a_quiet_time_of_0_gives_it_all_up, NODE_READS)
 {
-    set_quiet_time(b, 0);
-    device *d = add(b, UNIT, PROMPT);
+    if (kind == NODE_READS)
+        OK(mbm_line_setQuietTime(&s->line, 0));
+    else
+        OK(mbm_client_setQuietTime(&b->client, 0));
+    device *d = bench_add(b, UNIT, PROMPT);
     (void)loses_one(b, d);
     reads_well(b, UNIT, 50);
-    lose(d, 1);
-    IS(MBM_RESPONSE_TIMED_OUT, reads(b, UNIT, 1, NEVER));
+    device_loses(d, 1);
+    IS(MBM_RESPONSE_TIMED_OUT, bench_reads(b, UNIT, 1, NEVER));
     reads_well(b, UNIT, 50);
 }
 
-TEST(a_device_whose_replies_always_deviate_is_heard_again)
+NODE_TEST(a_device_whose_replies_always_deviate_is_heard_again)
 {
-    static const uint32_t with[] = {50 * MS, NEVER};
     static const int8_t by[] = {1, -1, 20};
-    BENCH;
 
-    kind = NODE_READS;
-    for (unsigned i = 0; i < COUNT(with); i++)
-        for (unsigned j = 0; j < COUNT(by); j++) {
-            device *d;
-            uint64_t began;
-
-            BEGIN;
-            OK(mbm_node_setLenient(&s->node, 1));
-            d = add(&b, UNIT, PROMPT);
-            d->deviates = by[j];
-            for (unsigned n = 0; n < 20; n++) {
-                const uint16_t address = (uint16_t)(40 * n);
-
-                if (n == 5)
-                    lose(d, 1);
-                began = s->now;
-                IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, 2));
-                if (n != 5) {
-                    OK(goes_on(&b, address, NEVER));
-                    assert_int_equal(mbm_node_available(&s->node), 2 + by[j]);
-                    assert_in_range(s->now - began, 0, 4 * TIMEOUT);
-                    continue;
-                }
-                assert_int_not_equal(goes_on(&b, address, with[i]), MBM_OK);
-                cancels(&b);
-            }
-        }
-}
-
-TEST(a_device_that_always_repeats_another_value_is_heard_again)
-{
-    static const uint32_t with[] = {50 * MS, NEVER};
-    BENCH;
-
-    kind = NODE_READS;
-    for (unsigned i = 0; i < COUNT(with); i++) {
-        device *d;
-
-        BEGIN;
+    for (unsigned j = 0; j < COUNT(by); j++) {
+        begin(b, s, (reader_kind)kind);
         OK(mbm_node_setLenient(&s->node, 1));
-        d = add(&b, UNIT, PROMPT);
-        d->repeats_wrong = 1;
-        s->response[0] = fault_value(0);
+        device *d = bench_add(b, UNIT, PROMPT);
+        d->deviates = by[j];
         for (unsigned n = 0; n < 20; n++) {
+            const uint16_t address = (uint16_t)(40 * n);
+            const uint64_t began = s->now;
+
             if (n == 5)
-                lose(d, 1);
-            IS(MBM_PENDING, mbm_node_writeSingleRegister(&s->node, 1, (uint16_t)n));
+                device_loses(d, 1);
+            IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, 2));
             if (n != 5) {
-                OK(goes_on(&b, 0, NEVER));
+                OK(bench_goes_on(b, address, NEVER));
+                assert_int_equal(mbm_node_available(&s->node), 2 + by[j]);
+                assert_in_range(s->now - began, 0, 4 * TIMEOUT);
                 continue;
             }
-            assert_int_not_equal(goes_on(&b, 0, with[i]), MBM_OK);
-            cancels(&b);
+            assert_int_not_equal(bench_goes_on(b, address, with), MBM_OK);
+            bench_cancels(b);
         }
+    }
+}
+
+NODE_TEST(a_device_that_always_repeats_another_value_is_heard_again)
+{
+    OK(mbm_node_setLenient(&s->node, 1));
+    device *d = bench_add(b, UNIT, PROMPT);
+    d->repeats_wrong = 1;
+    s->response[0] = fault_value(0);
+    for (unsigned n = 0; n < 20; n++) {
+        if (n == 5)
+            device_loses(d, 1);
+        IS(MBM_PENDING, mbm_node_writeSingleRegister(&s->node, 1, (uint16_t)n));
+        if (n != 5) {
+            OK(bench_goes_on(b, 0, NEVER));
+            continue;
+        }
+        assert_int_not_equal(bench_goes_on(b, 0, with), MBM_OK);
+        bench_cancels(b);
     }
 }
 
 /* A late reply to a read of more registers, to a lenient node that reads fewer, and the reverse.
  * All replies deviate. */
-TEST(no_late_reply_that_deviates_is_taken_for_the_next_one)
+NODE_TEST(no_late_reply_that_deviates_is_taken_for_the_next_one)
 {
-    static const uint32_t with[] = {50 * MS, NEVER};
-    BENCH;
+    for (unsigned first = 0; first < 2; first++) {
+        begin(b, s, (reader_kind)kind);
+        OK(mbm_node_setLenient(&s->node, 1));
+        device *d = bench_add(b, UNIT, PROMPT);
+        d->deviates = 1;
+        device_is_late(d, TIMEOUT + 300 * MS);
+        for (unsigned n = 0; n < 20; n++) {
+            const uint16_t address = (uint16_t)(40 * n), quantity = (n + first) % 2 ? 1 : 9;
 
-    kind = NODE_READS;
-    for (unsigned i = 0; i < COUNT(with); i++)
-        for (unsigned first = 0; first < 2; first++) {
-            device *d;
-
-            BEGIN;
-            OK(mbm_node_setLenient(&s->node, 1));
-            d = add(&b, UNIT, PROMPT);
-            d->deviates = 1;
-            be_late(d, TIMEOUT + 300 * MS);
-            for (unsigned n = 0; n < 20; n++) {
-                const uint16_t address = (uint16_t)(40 * n), quantity = (n + first) % 2 ? 1 : 9;
-
-                IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, quantity));
-                /* `goes_on` compares the first register. */
-                if (goes_on(&b, address, n == 0 ? with[i] : (uint32_t)NEVER) != MBM_OK) {
-                    assert_int_equal(n, 0);
-                    cancels(&b);
-                }
+            IS(MBM_PENDING, mbm_node_readHoldingRegisters(&s->node, address, quantity));
+            /* `bench_goes_on` compares the first register. */
+            if (bench_goes_on(b, address, n == 0 ? with : (uint32_t)NEVER) != MBM_OK) {
+                assert_int_equal(n, 0);
+                bench_cancels(b);
             }
         }
+    }
 }
 
 static uint8_t connect_again(void *context)
@@ -783,37 +535,30 @@ static uint8_t connect_again(void *context)
 static void disconnect(void *context) {}
 
 /* A new connection has no replies of the old one. A serial line that was opened again may. */
-TEST(a_new_connection_of_rtu_over_tcp_owes_nothing)
+BENCH_TEST(a_new_connection_of_rtu_over_tcp_owes_nothing, CLIENT_READS, CLIENT_READS, 0, 1)
 {
+    const mbm_linkHooks hooks = {.context = s, .connect = connect_again, .disconnect = disconnect};
     mbm_link link = MBM_INIT;
-    mbm_linkHooks hooks = {0};
     uint64_t sent;
-    BENCH;
 
-    hooks.context = s;
-    hooks.connect = connect_again;
-    hooks.disconnect = disconnect;
-    kind = CLIENT_READS;
-    for (int is_tcp = 0; is_tcp < 2; is_tcp++) {
-        BEGIN;
-        memset(&b.client, 0, sizeof b.client);
-        if (is_tcp)
-            OK(mbm_client_beginRtuOverTcp(&b.client, &s->port, b.frame, MBM_MAX_FRAME));
-        else
-            OK(mbm_client_beginRtu(&b.client, &s->port, b.frame, MBM_MAX_FRAME));
-        OK(mbm_client_setResponseTimeout(&b.client, TIMEOUT / MS));
-        OK(mbm_link_begin(&link, &b.client, &hooks));
-        add(&b, UNIT, PROMPT);
-        reads_well(&b, UNIT, 3);
-        sent = loses_one(&b, &b.devices[0]);
-        s->read_dead = 1;
-        (void)mbm_client_poll(&b.client);
-        OK(reads(&b, UNIT, 1, NEVER));
-        assert_int_equal(s->read_dead, 0);
-        if (is_tcp)
-            assert_in_range(s->frames[s->sent - 1].begin - sent, 0, EXCHANGE);
-        else
-            assert_in_range(s->frames[s->sent - 1].begin - sent, CLEAN, CLEAN + EXCHANGE);
-        OK(mbm_link_end(&link));
-    }
+    memset(&b->client, 0, sizeof b->client);
+    if (with)
+        OK(mbm_client_beginRtuOverTcp(&b->client, &s->port, b->frame, MBM_MAX_FRAME));
+    else
+        OK(mbm_client_beginRtu(&b->client, &s->port, b->frame, MBM_MAX_FRAME));
+    OK(mbm_client_setResponseTimeout(&b->client, TIMEOUT / MS));
+    OK(mbm_link_begin(&link, &b->client, &hooks));
+    bench_add(b, UNIT, PROMPT);
+    reads_well(b, UNIT, 3);
+    sent = loses_one(b, &b->devices[0]);
+    s->read_dead = 1;
+    (void)mbm_client_poll(&b->client);
+    OK(bench_reads(b, UNIT, 1, NEVER));
+    assert_int_equal(s->read_dead, 0);
+    sent = s->frames[s->sent - 1].begin - sent;
+    if (with)
+        assert_in_range(sent, 0, EXCHANGE);
+    else
+        assert_in_range(sent, CLEAN, CLEAN + EXCHANGE);
+    OK(mbm_link_end(&link));
 }

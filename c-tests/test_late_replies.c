@@ -2,70 +2,39 @@
  * like the answer to the next request: an RTU frame has no number that distinguishes them.
  * No late reply may become the data of a later request. On a simulated clock; unit 17 is 11
  * on the wire. */
-#include "crc.h"
 #include "faults.h"
-#include "sim.h"
+#include "reader.h"
 #include "test.h"
 
 enum {
     TIMEOUT_MS = 500,
-    LATE = 750000,  /* microseconds that the device takes for a late reply */
-    PROMPT = 3000,  /* microseconds that it takes for all others */
-    QUIET = 100000, /* the default quiet time */
-    REGISTERS = 125 /* the most registers of a reply */
+    LATE = 750 * MS,  /* what the device takes for a late reply; PROMPT for all others */
+    QUIET = 100 * MS, /* the default quiet time */
+    REGISTERS = 125   /* the most registers of a reply */
 };
 
-/* The device, and the microseconds that it takes for each of the next requests. After those
- * it takes PROMPT. */
-typedef struct in_order {
-    uint32_t takes[8];
-    unsigned requests;
-    uint64_t free;     /* when its last reply has been sent */
-    uint8_t exception; /* the exception with which it answers the first request */
-    unsigned cut;      /* the number of the reply that loses its second half; the first is 1 */
-    unsigned damaged;  /* the number of the reply that arrives damaged; the first is 1 */
-    unsigned trailing; /* bytes 0x00 that its driver adds to each reply */
-} in_order;
+static bench line;
+static device *d;
 
-static void answer_in_order(sim *s, const sim_frame *request)
+static void begin(sim *s, reader_kind kind)
 {
-    in_order *d = (in_order *)s->context;
-    unsigned number = d->requests + 1;
-    uint32_t takes = number <= 8 && d->takes[number - 1] ? d->takes[number - 1] : PROMPT;
-    uint64_t at = (d->free > request->end ? d->free : request->end) + takes;
-    uint8_t frame[300] = {0};
-    size_t length = fault_right_reply(frame, request->bytes);
-
-    if (request->bytes[0] != 17) { /* another device, which is never late */
-        sim_deliver(s, request->end + PROMPT, frame, length);
-        return;
-    }
-    d->requests = number;
-    if (number == 1 && d->exception) {
-        frame[1] |= 0x80;
-        frame[2] = d->exception;
-        length = seal(frame, 3);
-    }
-    if (number == d->damaged)
-        frame[length - 1] ^= 0x40;
-    if (number == d->cut)
-        length /= 2;
-    memset(frame + length, 0, d->trailing);
-    length += d->trailing;
-    sim_deliver(s, at, frame, length);
-    d->free = at + length * s->character;
+    bench_begin(&line, s, kind, TIMEOUT_MS * MS);
+    OK(mbm_node_setBlocking(&s->node, 1));
+    d = bench_add(&line, UNIT, PROMPT);
+    device_is_late(d, LATE);
+    bench_add(&line, 18, PROMPT);
 }
 
-static in_order device;
-
-/* The simulation with such a device. Its first reply is late. */
+/* The simulation with a device whose first reply is late. */
 static void begin_device(sim *s)
 {
-    device = (in_order){.takes = {LATE}};
-    s->limit = 2000000000;
-    s->device = answer_in_order;
-    s->context = &device;
-    OK(mbm_node_setResponseTimeout(&s->node, TIMEOUT_MS));
+    begin(s, NODE_READS);
+}
+
+/* From now on the device is as new, and in time. */
+static void renew(void)
+{
+    *d = (device){.unit = UNIT, .takes = PROMPT};
 }
 
 #define DEVICE_TEST(name) SIM_TEST_WITH(name, begin_device)
@@ -92,7 +61,7 @@ DEVICE_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
 
 DEVICE_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 {
-    device.takes[1] = 50000; /* longer than the gap before the next request */
+    d->takes = 50000; /* longer than the gap before the next request */
     OK(mbm_line_setRetries(&s->line, 1));
     for (uint16_t i = 0; i < 100; i++)
         assert_reads(s, i, 1);
@@ -118,7 +87,7 @@ DEVICE_TEST(several_late_replies_in_a_row_are_all_skipped)
 {
     uint16_t i;
 
-    device.takes[0] = 1700000; /* after two more requests */
+    d->takes_for_late = 1700000; /* after two more requests */
     for (i = 0; i < 3; i++)
         assert_int_equal(read_at(s, i), i < 2 ? MBM_RESPONSE_TIMED_OUT : MBM_OK);
     assert_int_equal(s->response[0], fault_value(2));
@@ -129,7 +98,7 @@ DEVICE_TEST(several_late_replies_in_a_row_are_all_skipped)
 /* The reply is held beyond the response timeout. */
 DEVICE_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
 {
-    device.takes[0] = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
+    d->takes_for_late = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 50; i++)
         assert_reads(s, i, 1);
@@ -140,9 +109,9 @@ DEVICE_TEST(a_late_exception_is_not_the_answer_to_a_later_request)
     static const uint8_t codes[] = {2, 5, 6, 0x0B};
 
     for (unsigned i = 0; i < COUNT(codes); i++) {
-        memset(&device, 0, sizeof device);
-        device.takes[0] = LATE;
-        device.exception = codes[i];
+        renew();
+        device_is_late(d, LATE);
+        d->exception = codes[i];
         assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
         assert_reads(s, 1, 1);
         assert_int_equal(mbm_node_getExceptionCode(n), 0);
@@ -152,8 +121,8 @@ DEVICE_TEST(a_late_exception_is_not_the_answer_to_a_later_request)
 
 DEVICE_TEST(after_an_exception_in_time_no_reply_is_held)
 {
-    device.takes[0] = 0;
-    device.exception = 5;
+    d->late = 0;
+    d->exception = 5;
     assert_int_equal(read_at(s, 0), 5);
     assert_reads(s, 1, 1);
     /* An exception is an answer, so no reply is late or held. */
@@ -163,7 +132,7 @@ DEVICE_TEST(after_an_exception_in_time_no_reply_is_held)
 /* The reply that was held first is most likely the late one. */
 DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 {
-    device.damaged = 2;
+    d->damaged = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
     assert_int_equal(s->response[0], 0);
@@ -173,7 +142,7 @@ DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 
 DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 {
-    device.cut = 2;
+    d->cut = 2;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
     assert_int_equal(s->response[0], 0);
@@ -184,11 +153,11 @@ DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 /* A driver of RS-485 that releases the line can do this. */
 DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
-    device.trailing = 1;
+    d->trailing = 1;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, i, 1);
-    device.requests = 0;
+    d->requests = 0;
     assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
@@ -196,9 +165,9 @@ DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 
 DEVICE_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
 {
-    device.takes[0] = 0xFFFFFFFF; /* no reply */
+    d->takes_for_late = 0xFFFFFFFF; /* no reply */
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    memset(&device, 0, sizeof device);
+    renew();
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, 1000 * TIMEOUT_MS, 1000 * TIMEOUT_MS + SIM_SLACK);
     uint64_t begin = s->now;
@@ -210,8 +179,8 @@ DEVICE_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_n
 /* The damaged reply has come, so none is late. */
 DEVICE_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
 {
-    device.takes[0] = 0;
-    device.damaged = 1;
+    d->late = 0;
+    d->damaged = 1;
     assert_int_equal(read_at(s, 0), MBM_INVALID_CRC);
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
@@ -219,8 +188,8 @@ DEVICE_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
 
 DEVICE_TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
 {
-    device.takes[0] = 0;
-    device.damaged = 1;
+    d->late = 0;
+    d->damaged = 1;
     OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(read_at(s, 0), MBM_PENDING);
     while (s->sent == 0 || s->now < s->frames[0].end + 1000) {
@@ -243,7 +212,7 @@ DEVICE_TEST(a_right_reply_before_a_request_lets_the_next_one_be_held)
     const uint8_t request[6] = {17, 3, 0, 7, 0, 1};
     size_t length = fault_right_reply(frame, request);
 
-    device.takes[0] = 0;
+    d->late = 0;
     assert_reads(s, 0, 1);
     sim_deliver(s, s->now + 10000, frame, length);
     s->now += 50000;
@@ -260,7 +229,7 @@ DEVICE_TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
     const uint8_t request[6] = {17, 3, 0, 7, 0, 2};
     size_t length = fault_right_reply(frame, request);
 
-    device.takes[0] = 0;
+    d->late = 0;
     assert_reads(s, 0, 1);
     sim_deliver(s, s->now + 10000, frame, length); /* two registers */
     sim_deliver(s, s->now + 20000, (const uint8_t *)"\0\x11\x03", 3);
@@ -273,9 +242,9 @@ DEVICE_TEST(noise_and_other_replies_before_a_request_let_no_reply_be_held)
 DEVICE_TEST(without_a_quiet_time_no_reply_is_held)
 {
     OK(mbm_line_setQuietTime(&s->line, 0));
-    device.takes[0] = 0xFFFFFFFF;
+    d->takes_for_late = 0xFFFFFFFF;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    memset(&device, 0, sizeof device);
+    renew();
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
 }
@@ -292,80 +261,45 @@ DEVICE_TEST(the_reply_of_another_unit_does_not_end_the_holding)
     assert_reads(s, 2, 1);
 }
 
-static uint8_t run(sim *s, mbm_client *client, const mbm_clientRequest *request)
-{
-    while (mbm_client_poll(client) == MBM_PENDING && request->status == MBM_PENDING)
-        s->now += s->idle_step;
-    return request->status;
-}
-
-static void client_reads(sim *s, mbm_client *client, uint16_t address, uint8_t status)
-{
-    mbm_clientRequest request = {0};
-    uint16_t word = 0;
-
-    request.unit = 17;
-    request.reply = &word;
-    request.replyBytes = sizeof word;
-    assert_int_equal(mbm_client_readHoldingRegisters(client, &request, address, 1), MBM_PENDING);
-    assert_int_equal(run(s, client, &request), status);
-    if (status == MBM_OK)
-        assert_int_equal(word, fault_value(address));
-}
-
-static void begin_client(sim *s, mbm_client *client)
-{
-    memset(client, 0, sizeof *client);
-    OK(mbm_client_beginRtu(client, &s->port, s->buffer, sizeof s->buffer));
-    OK(mbm_client_setResponseTimeout(client, TIMEOUT_MS));
-}
-
 DEVICE_TEST(one_late_reply_does_not_shift_the_clients_answers)
 {
-    mbm_client client;
-
-    begin_client(s, &client);
-    client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
+    begin(s, CLIENT_READS);
+    IS(MBM_RESPONSE_TIMED_OUT, bench_reads(&line, UNIT, 0, NEVER));
     for (uint16_t i = 1; i < 100; i++)
-        client_reads(s, &client, i, MBM_OK);
+        OK(bench_reads(&line, UNIT, i, NEVER));
 }
 
 DEVICE_TEST(a_late_reply_does_not_shift_the_clients_answers_after_a_retry)
 {
-    mbm_client client;
-
-    begin_client(s, &client);
-    OK(mbm_client_setRetries(&client, 1));
-    device.takes[1] = 50000;
+    begin(s, CLIENT_READS);
+    OK(mbm_client_setRetries(&line.client, 1));
+    d->takes = 50000;
     for (uint16_t i = 0; i < 100; i++)
-        client_reads(s, &client, i, MBM_OK);
+        OK(bench_reads(&line, UNIT, i, NEVER));
 }
 
 /* Return Query Data with data that no other request has. */
-static uint8_t echoes(sim *s, mbm_client *client, uint16_t data)
+static uint8_t echoes(sim *s, uint16_t data)
 {
-    mbm_clientRequest request = {0};
     uint16_t reply = 0;
+    mbm_clientRequest request = {
+        .unit = UNIT, .data = &data, .reply = &reply, .replyBytes = sizeof reply};
 
-    request.unit = 17;
-    request.data = &data;
-    request.reply = &reply;
-    request.replyBytes = sizeof reply;
-    assert_int_equal(mbm_client_diagnostics(client, &request, 0, 1), MBM_PENDING);
-    return run(s, client, &request);
+    IS(MBM_PENDING, mbm_client_diagnostics(&line.client, &request, 0, 1));
+    while (mbm_client_poll(&line.client) == MBM_PENDING && request.status == MBM_PENDING)
+        s->now += s->idle_step;
+    return request.status;
 }
 
 /* So this request finds out at once whether the answers are in step. */
 DEVICE_TEST(a_reply_that_repeats_data_of_its_own_is_not_held)
 {
-    mbm_client client;
-
-    begin_client(s, &client);
-    device.takes[0] = LATE + 200000;
-    client_reads(s, &client, 0, MBM_RESPONSE_TIMED_OUT);
-    OK(echoes(s, &client, 0xA55A));
+    begin(s, CLIENT_READS);
+    d->takes_for_late = LATE + 200000;
+    IS(MBM_RESPONSE_TIMED_OUT, bench_reads(&line, UNIT, 0, NEVER));
+    OK(echoes(s, 0xA55A));
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
-    client_reads(s, &client, 1, MBM_OK);
+    OK(bench_reads(&line, UNIT, 1, NEVER));
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
 }
 
@@ -378,7 +312,7 @@ DEVICE_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_end
     uint64_t at;
 
     /* The device owes more replies than are counted, so each one is held. */
-    device.takes[0] = 0xFFFFFFFF;
+    d->takes_for_late = 0xFFFFFFFF;
     for (unsigned i = 0; i < 40; i++)
         assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     s->device = NULL;
@@ -393,7 +327,7 @@ DEVICE_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_end
 /* The late reply, then the one to the request. The unit owes no other, so it is not held. */
 DEVICE_TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 {
-    device.takes[0] = LATE;
+    d->takes_for_late = LATE;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     for (uint16_t i = 1; i < 4; i++) {
         OK(read_at(s, i));
@@ -410,7 +344,7 @@ DEVICE_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_
     size_t length = fault_right_reply(frame, request);
     uint64_t at, sent;
 
-    device.takes[0] = 0xFFFFFFFF;
+    d->takes_for_late = 0xFFFFFFFF;
     assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
     s->device = NULL;
     /* The last reply arrives shortly before the wait is over. */
@@ -419,13 +353,8 @@ DEVICE_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_
         sim_deliver(s, at, frame, length);
     OK(mbm_node_setBlocking(n, 0));
     assert_int_equal(read_at(s, 7), MBM_PENDING);
-    while (mbm_node_poll(n) == MBM_PENDING) {
-        uint64_t next = s->now + mbm_node_pollDelay(n);
-
-        if (s->first < s->last && s->incoming[s->first].at < next)
-            next = s->incoming[s->first].at;
-        s->now = next > s->now ? next : s->now + 1;
-    }
+    while (mbm_node_poll(n) == MBM_PENDING)
+        sleep_until_a_byte(s, mbm_node_pollDelay(n), UINT64_MAX);
     sent = s->frames[s->sent - 1].end;
     assert_in_range(s->now - sent, 0, 1000 * 3 * TIMEOUT_MS + 1000);
 }
