@@ -1,5 +1,6 @@
-/* A plan refuses these, and changes nothing then. */
+/* A plan refuses these, and changes nothing then; calls from within its hooks. */
 #include "refused.h"
+#include "hooked_port.h"
 #include "plan_device.h"
 #include "test.h"
 
@@ -407,4 +408,156 @@ TEST_WITH(a_value_is_pending_before_the_first_reply_and_ages_after_it, start, NU
     assert_in_range(age, 0, 500);
     OK(mbm_plan_end(&d.plan));
     IS(MBM_NOT_INITIALISED, mbm_plan_getStatus(&d.plan, 0, &age));
+}
+
+/* --- calls from within the hooks of the client's port, from `done` of another request, and from
+ * `update` --- */
+
+static hooked_port wire;
+static mbm_plan other;
+static unsigned entered, updated;
+static uint8_t status_in_hooks;
+
+/* The values of the fields, once they were read. */
+static void every_value_is_there(void)
+{
+    mbm_registers registers;
+    mbm_planReadInfo read;
+    double number;
+    int64_t integer;
+    int32_t short_integer;
+    float single;
+    char text[5];
+
+    OK(mbm_plan_getNumber(&d.plan, 0, 0, &number));
+    assert_true(number == 0x1234);
+    OK(mbm_plan_getInteger(&d.plan, 0, 0, &integer));
+    assert_int_equal(integer, 0x1234);
+    OK(mbm_plan_getInt32(&d.plan, 0, 0, &short_integer));
+    assert_int_equal(short_integer, 0x1234);
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, 0, 0, &single));
+    OK(mbm_plan_getText(&d.plan, 1, text, sizeof text));
+    assert_string_equal(text, "abcd");
+    OK(mbm_plan_getRegisters(&d.plan, 1, &registers));
+    OK(mbm_plan_getRead(&d.plan, 0, &read));
+    assert_int_equal(read.quantity, 3);
+}
+
+static void within_port(int hook)
+{
+    uint32_t age;
+
+    entered++;
+    UNCHANGED(d.plan, {
+        IS(MBM_BUSY, mbm_plan_poll(&d.plan));
+        assert_int_equal(mbm_plan_pollDelay(&d.plan), 0);
+        IS(MBM_BUSY, mbm_plan_refresh(&d.plan, 0));
+        IS(MBM_BUSY, mbm_plan_end(&d.plan));
+        IS(MBM_BUSY, plan_device_try(&d, NULL));
+        IS(MBM_BUSY, mbm_plan_begin(&other, &d.client, &d.setup, NULL));
+        IS(status_in_hooks, mbm_plan_getStatus(&d.plan, 0, &age));
+        if (status_in_hooks == MBM_OK)
+            every_value_is_there();
+    });
+    assert_int_equal(d.requests[0].status, MBM_PENDING);
+}
+
+static void begin_hooked(void)
+{
+    const mbm_port port = hooked_port_of(&wire);
+
+    rtu();
+    memset(&wire, 0, sizeof wire);
+    memset(&other, 0, sizeof other);
+    wire.step = 500;
+    entered = updated = 0;
+    status_in_hooks = MBM_PENDING;
+    OK(mbm_client_beginRtu(&d.client, &port, d.frame, sizeof d.frame));
+    plan_device_add(&d, 17, HOLDING, MBM_TYPE_UINT16, 1, 10000);
+    plan_device_add(&d, 17, HOLDING, MBM_TYPE_TEXT, 2, 10000)->count = 4;
+    d.setup.update = NULL;
+}
+
+/* Polls until the plan's request has ended. */
+static void run(void)
+{
+    OK(mbm_plan_poll(&d.plan));
+    wire.within = within_port;
+    wire.first = wire.last = wire.length = 0;
+    for (unsigned i = 0; i < 3000 && mbm_client_poll(&d.client) == MBM_PENDING; i++)
+        if (wire.length > 0 && wire.last == 0)
+            hooked_port_arrive_rtu(&wire, 17, "\3\6\x12\x34\x61\x62\x63\x64", 8);
+    wire.within = NULL;
+    OK(d.requests[0].status);
+}
+
+TEST_WITH(no_hook_of_the_clients_port_may_change_the_plan, begin_hooked, NULL)
+{
+    plan_device_start(&d);
+    run();
+    assert_true(entered > 3);
+    OK(mbm_plan_poll(&d.plan));
+    OK(mbm_plan_getStatus(&d.plan, 0, NULL));
+    /* Again, while there are values. */
+    status_in_hooks = MBM_OK;
+    entered = 0;
+    OK(mbm_plan_refresh(&d.plan, 1));
+    run();
+    assert_true(entered > 3);
+    OK(mbm_plan_end(&d.plan));
+}
+
+static void update(void *context, mbm_plan *of, uint16_t field)
+{
+    assert_ptr_equal(of, &d.plan);
+    OK(mbm_plan_getStatus(&d.plan, field, NULL));
+    every_value_is_there();
+    /* Polls call no hook that is called already. */
+    (void)mbm_client_poll(&d.client);
+    OK(mbm_plan_refresh(&d.plan, field));
+    assert_int_equal(mbm_plan_pollDelay(&d.plan), 0);
+    updated++;
+    if (updated == 2) {
+        OK(mbm_plan_poll(&d.plan));
+        IS(MBM_PENDING, d.requests[0].status);
+    }
+}
+
+TEST_WITH(update_may_call_every_function, begin_hooked, NULL)
+{
+    d.setup.update = update;
+    plan_device_start(&d);
+    run();
+    assert_int_equal(updated, 0);
+    OK(mbm_plan_poll(&d.plan));
+    assert_int_equal(updated, 2);
+    OK(mbm_plan_end(&d.plan));
+    assert_int_equal(mbm_client_pending(&d.client), 0);
+}
+
+static void poll_when_done(void *context, mbm_clientRequest *ended)
+{
+    ++*(unsigned *)context;
+    OK(mbm_plan_poll(&d.plan));
+    IS(MBM_PENDING, d.requests[0].status);
+    IS(MBM_PENDING, mbm_plan_getStatus(&d.plan, 0, NULL));
+    assert_int_equal(mbm_plan_pollDelay(&d.plan), UINT32_MAX);
+    OK(mbm_plan_end(&d.plan));
+    IS(MBM_CANCELLED, d.requests[0].status);
+    plan_device_start(&d);
+}
+
+TEST_WITH(done_of_another_request_may_call_every_function, begin_hooked, NULL)
+{
+    unsigned calls = 0;
+    mbm_clientRequest own = {.unit = 3, .done = poll_when_done, .context = &calls};
+
+    OK(mbm_client_setResponseTimeout(&d.client, 20));
+    plan_device_start(&d);
+    IS(MBM_PENDING, mbm_client_readCoils(&d.client, &own, 0, 1));
+    for (unsigned i = 0; i < 3000 && mbm_client_poll(&d.client) == MBM_PENDING; i++) {
+    }
+    assert_int_equal(calls, 1);
+    IS(MBM_RESPONSE_TIMED_OUT, own.status);
+    OK(mbm_plan_end(&d.plan));
 }

@@ -1,8 +1,8 @@
 /* Every function of a line, a node or a server, called from within each of its hooks. Where no call
  * is allowed, it returns MBM_BUSY and changes nothing. Where calls are allowed, they work. */
+#include "refused.h"
 #include "every_call.h"
 #include "hooked_port.h"
-#include "test.h"
 
 /* How often a hook has made its calls. */
 static unsigned entered;
@@ -10,10 +10,7 @@ static unsigned entered;
 /* Asserts that the calls leave the object as it was. */
 #define UNCHANGED_BY(object, calls)                                                                \
     do {                                                                                           \
-        static uint8_t before[sizeof(object)];                                                     \
-        memcpy(before, &(object), sizeof(object));                                                 \
-        calls;                                                                                     \
-        assert_memory_equal(before, &(object), sizeof(object));                                    \
+        UNCHANGED(object, calls);                                                                  \
         entered++;                                                                                 \
     } while (0)
 
@@ -26,6 +23,9 @@ static mbm_line line;
 static mbm_node master;
 static mbm_server server;
 static mbm_unit unit;
+static mbm_client client;
+static mbm_clientRequest request, another;
+static mbm_identification identification;
 
 static void reset(void)
 {
@@ -34,6 +34,10 @@ static void reset(void)
     memset(&master, 0, sizeof master);
     memset(&server, 0, sizeof server);
     memset(&unit, 0, sizeof unit);
+    memset(&client, 0, sizeof client);
+    memset(&request, 0, sizeof request);
+    memset(&another, 0, sizeof another);
+    memset(&identification, 0, sizeof identification);
     memset(words, 0, sizeof words);
     wire.step = 500;
     port = hooked_port_of(&wire);
@@ -273,25 +277,14 @@ static void serve_all(void)
 {
     access_hooks.beforeRead = access_hooks.beforeWrite = before_access;
     access_hooks.afterWrite = after_access;
-    memset(&table, 0, sizeof table);
-    memset(&late_table, 0, sizeof late_table);
-    memset(&cells, 0, sizeof cells);
-    memset(&custom, 0, sizeof custom);
-    memset(&diagnostics, 0, sizeof diagnostics);
-    memset(&files, 0, sizeof files);
     unit.id = 17;
-    table.words = late_table.words = words;
-    table.size = late_table.size = 8;
+    table = late_table = (mbm_registerTable){.words = words, .size = 8};
+    cells = (mbm_dataCallbacks){.isValid = cell_is_valid, .get = cell_get, .set = cell_set};
+    custom = (mbm_custom){.serve = carry_out, .code = 65};
+    diagnostics = (mbm_diagnostics){.restart = restarted};
+    files = (mbm_files){.files = &file, .count = 1};
     OK(mbm_registerTable_setHooks(&table, &access_hooks));
-    cells.isValid = cell_is_valid;
-    cells.get = cell_get;
-    cells.set = cell_set;
     OK(mbm_dataCallbacks_setHooks(&cells, &access_hooks));
-    custom.serve = carry_out;
-    custom.code = 65;
-    diagnostics.restart = restarted;
-    files.files = &file;
-    files.count = 1;
     OK(mbm_files_setHooks(&files, &access_hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&table));
@@ -393,34 +386,17 @@ TEST(a_server_that_its_hook_zeroes_is_not_accessed_again)
 /* Every function of a client, called from within each of its hooks. Where no call is
  * allowed, it returns MBM_BUSY and changes nothing. Calls from `done` work. */
 
-static mbm_client client;
-static mbm_clientRequest request, another;
-static mbm_identification identification;
-
-static void reset_client(void)
-{
-    memset(&wire, 0, sizeof wire);
-    memset(&client, 0, sizeof client);
-    memset(&request, 0, sizeof request);
-    memset(&another, 0, sizeof another);
-    memset(&identification, 0, sizeof identification);
-    memset(words, 0, sizeof words);
-    wire.step = 500;
-    port = hooked_port_of(&wire);
-    entered = 0;
-}
-
 /* No read begins an identification, or it is cancelled again. */
 static void an_identification_answers(uint8_t status)
 {
-    const mbm_identification before = identification;
+    const mbm_identification kept = identification;
 
     identification.request.unit = 17;
     identification.request.reply = words;
     IS(status, mbm_identification_read(&identification, &client, MBM_DEVICE_ID_BASIC, 0));
     if (status == MBM_PENDING)
         OK(mbm_client_cancel(&client, &identification.request));
-    identification = before;
+    identification = kept;
 }
 
 static void every_function_of_the_client_is_busy(void)
@@ -491,7 +467,7 @@ static void poll_until_all_have_ended(void)
     assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-TEST_WITH(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client, reset_client, NULL)
+TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client)
 {
     for (int framing = 0; framing < 4; framing++) {
         wire.within = framing == 2 ? NULL : within_client; /* the begin of TCP calls no hook */
@@ -575,7 +551,7 @@ static void done(void *context, mbm_clientRequest *ended)
     }
 }
 
-TEST_WITH(a_done_function_may_call_its_client, reset_client, NULL)
+TEST(a_done_function_may_call_its_client)
 {
     for (framing_of_done = 0; framing_of_done < 4; framing_of_done++) {
         for (done_does = 0; done_does < 5; done_does++) {
@@ -603,7 +579,7 @@ TEST_WITH(a_done_function_may_call_its_client, reset_client, NULL)
     }
 }
 
-TEST_WITH(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line, reset_client, NULL)
+TEST(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line)
 {
     static mbm_line shared;
 
@@ -616,196 +592,4 @@ TEST_WITH(the_clock_may_not_call_the_client_that_gives_its_port_to_a_line, reset
     wire.within = NULL;
     assert_int_equal(entered, 1);
     OK(mbm_client_resume(&client, &shared));
-}
-
-/* Every function of a plan, called from within each hook of its client's port, from `done` of
- * another request, and from `update`. */
-
-enum { WORDS = 4 };
-
-static uint8_t frame[256];
-
-static mbm_clientRequest own;
-
-static const mbm_planField fields[2] = {
-    {.unit = 17,
-     .table = MBM_TABLE_HOLDING_REGISTERS,
-     .type = MBM_TYPE_UINT16,
-     .address = 1,
-     .intervalMs = 10000},
-    {.unit = 17,
-     .table = MBM_TABLE_HOLDING_REGISTERS,
-     .type = MBM_TYPE_TEXT,
-     .address = 2,
-     .count = 4,
-     .intervalMs = 10000},
-};
-static mbm_planPosition positions[2];
-static mbm_planRead reads[2];
-static mbm_clientRequest requests[1];
-static uint16_t data[WORDS];
-static mbm_planSetup setup;
-static mbm_plan plan, other;
-
-/* The values of the fields, once they were read. */
-static void every_value_is_there(void)
-{
-    mbm_registers registers;
-    mbm_planReadInfo read;
-    double number;
-    int64_t integer;
-    int32_t short_integer;
-    float single;
-    char text[5];
-
-    OK(mbm_plan_getNumber(&plan, 0, 0, &number));
-    assert_true(number == 0x1234);
-    OK(mbm_plan_getInteger(&plan, 0, 0, &integer));
-    assert_int_equal(integer, 0x1234);
-    OK(mbm_plan_getInt32(&plan, 0, 0, &short_integer));
-    assert_int_equal(short_integer, 0x1234);
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&plan, 0, 0, &single));
-    OK(mbm_plan_getText(&plan, 1, text, sizeof text));
-    assert_string_equal(text, "abcd");
-    OK(mbm_plan_getRegisters(&plan, 1, &registers));
-    OK(mbm_plan_getRead(&plan, 0, &read));
-    assert_int_equal(read.quantity, 3);
-}
-
-static uint8_t status_in_hooks;
-
-static void within_port(int hook)
-{
-    uint32_t age;
-
-    UNCHANGED_BY(plan, {
-        IS(MBM_BUSY, mbm_plan_poll(&plan));
-        assert_int_equal(mbm_plan_pollDelay(&plan), 0);
-        IS(MBM_BUSY, mbm_plan_refresh(&plan, 0));
-        IS(MBM_BUSY, mbm_plan_end(&plan));
-        IS(MBM_BUSY, mbm_plan_begin(&plan, &client, &setup, NULL));
-        IS(MBM_BUSY, mbm_plan_begin(&other, &client, &setup, NULL));
-        IS(status_in_hooks, mbm_plan_getStatus(&plan, 0, &age));
-        if (status_in_hooks == MBM_OK)
-            every_value_is_there();
-    });
-    assert_int_equal(requests[0].status, MBM_PENDING);
-}
-
-static unsigned updated;
-
-static void update(void *context, mbm_plan *of, uint16_t field)
-{
-    assert_ptr_equal(of, &plan);
-    wire.within = NULL;
-    OK(mbm_plan_getStatus(&plan, field, NULL));
-    every_value_is_there();
-    /* Polls call no hook that is called already. */
-    (void)mbm_client_poll(&client);
-    OK(mbm_plan_refresh(&plan, field));
-    assert_int_equal(mbm_plan_pollDelay(&plan), 0);
-    updated++;
-    if (updated == 2) {
-        OK(mbm_plan_poll(&plan));
-        IS(MBM_PENDING, requests[0].status);
-    }
-}
-
-static const uint8_t reply[] = {3, 6, 0x12, 0x34, 'a', 'b', 'c', 'd'};
-
-static void begin(void)
-{
-    memset(&wire, 0, sizeof wire);
-    memset(&client, 0, sizeof client);
-    memset(&own, 0, sizeof own);
-    memset(&plan, 0, sizeof plan);
-    memset(&other, 0, sizeof other);
-    memset(requests, 0, sizeof requests);
-    memset(&setup, 0, sizeof setup);
-    setup.fields = fields;
-    setup.positions = positions;
-    setup.reads = reads;
-    setup.data = data;
-    setup.requests = requests;
-    setup.fieldCount = 2;
-    setup.readCount = 2;
-    setup.dataWords = WORDS;
-    setup.requestCount = 1;
-    entered = updated = 0;
-    status_in_hooks = MBM_PENDING;
-    wire.step = 500;
-    port = hooked_port_of(&wire);
-    OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
-}
-
-/* Polls until the plan's request has ended. */
-static void run(void)
-{
-    OK(mbm_plan_poll(&plan));
-    wire.within = within_port;
-    for (unsigned i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
-        if (wire.length > 0 && wire.last == 0)
-            hooked_port_arrive_rtu(&wire, 17, reply, sizeof reply);
-    }
-    wire.within = NULL;
-    OK(requests[0].status);
-}
-
-TEST_WITH(no_hook_of_the_clients_port_may_change_the_plan, begin, NULL)
-{
-    OK(mbm_plan_begin(&plan, &client, &setup, NULL));
-    run();
-    assert_true(entered > 3);
-    OK(mbm_plan_poll(&plan));
-    OK(mbm_plan_getStatus(&plan, 0, NULL));
-    /* Again, while there are values. */
-    status_in_hooks = MBM_OK;
-    entered = 0;
-    memset(&wire.arriving, 0, sizeof wire.arriving);
-    wire.first = wire.last = wire.length = 0;
-    OK(mbm_plan_refresh(&plan, 1));
-    run();
-    assert_true(entered > 3);
-    OK(mbm_plan_end(&plan));
-}
-
-TEST_WITH(update_may_call_every_function, begin, NULL)
-{
-    setup.update = update;
-    OK(mbm_plan_begin(&plan, &client, &setup, NULL));
-    run();
-    assert_int_equal(updated, 0);
-    OK(mbm_plan_poll(&plan));
-    assert_int_equal(updated, 2);
-    OK(mbm_plan_end(&plan));
-    assert_int_equal(mbm_client_pending(&client), 0);
-}
-
-static void poll_when_done(void *context, mbm_clientRequest *ended)
-{
-    ++*(unsigned *)context;
-    OK(mbm_plan_poll(&plan));
-    IS(MBM_PENDING, requests[0].status);
-    IS(MBM_PENDING, mbm_plan_getStatus(&plan, 0, NULL));
-    assert_int_equal(mbm_plan_pollDelay(&plan), UINT32_MAX);
-    OK(mbm_plan_end(&plan));
-    IS(MBM_CANCELLED, requests[0].status);
-    OK(mbm_plan_begin(&plan, &client, &setup, NULL));
-}
-
-TEST_WITH(done_of_another_request_may_call_every_function, begin, NULL)
-{
-    unsigned calls = 0, i;
-
-    OK(mbm_client_setResponseTimeout(&client, 20));
-    OK(mbm_plan_begin(&plan, &client, &setup, NULL));
-    own.unit = 3;
-    own.done = poll_when_done;
-    own.context = &calls;
-    IS(MBM_PENDING, mbm_client_readCoils(&client, &own, 0, 1));
-    for (i = 0; i < 3000 && mbm_client_poll(&client) == MBM_PENDING; i++) {
-    }
-    assert_int_equal(calls, 1);
-    IS(MBM_RESPONSE_TIMED_OUT, own.status);
-    OK(mbm_plan_end(&plan));
 }
