@@ -330,6 +330,10 @@ TEST_WITH(each_type_has_its_getters, start, NULL)
                  mbm_plan_getNumber(&d.plan, field, index, &value.number));
             GETS(OK_IF(is && types[i].is_float),
                  mbm_plan_getFloat(&d.plan, field, index, &value.single));
+            GETS(OK_IF(is && types[i].is_number),
+                 mbm_plan_getConverted(&d.plan, field, index, NULL, &value.number));
+            GETS(OK_IF(is && types[i].is_int32),
+                 mbm_plan_getDecimal(&d.plan, field, index, NULL, 0, &value.int32));
         }
         GETS(OK_IF(types[i].is_text), mbm_plan_getText(&d.plan, field, value.text, 5));
         GETS(OK_IF(types[i].is_registers), mbm_plan_getRegisters(&d.plan, field, &value.view));
@@ -337,6 +341,8 @@ TEST_WITH(each_type_has_its_getters, start, NULL)
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getInt32(&d.plan, field, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getNumber(&d.plan, field, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getFloat(&d.plan, field, 0, NULL));
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getConverted(&d.plan, field, 0, NULL, NULL));
+        IS(MBM_INVALID_ARGUMENT, mbm_plan_getDecimal(&d.plan, field, 0, NULL, 0, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getText(&d.plan, field, NULL, 5));
         IS(MBM_INVALID_ARGUMENT, mbm_plan_getRegisters(&d.plan, field, NULL));
     }
@@ -352,6 +358,9 @@ static void every_call_returns(uint8_t status, mbm_plan *plan, uint16_t field)
     GETS(status, mbm_plan_getInt32(plan, field, 0, &value.int32));
     GETS(status, mbm_plan_getNumber(plan, field, 0, &value.number));
     GETS(status, mbm_plan_getFloat(plan, field, 0, &value.single));
+    GETS(status, mbm_plan_getConverted(plan, field, 0, NULL, &value.number));
+    GETS(status, mbm_plan_getDecimal(plan, field, 0, NULL, 0, &value.int32));
+    IS(status, mbm_plan_checkAvailable(plan, field, 0, NULL));
     GETS(status, mbm_plan_getText(plan, field, value.text, sizeof value.text));
     GETS(status, mbm_plan_getRegisters(plan, field, &value.view));
     REFUSED(status, age, mbm_plan_getStatus(plan, field, &age));
@@ -408,6 +417,32 @@ TEST_WITH(a_value_is_pending_before_the_first_reply_and_ages_after_it, start, NU
     assert_in_range(age, 0, 500);
     OK(mbm_plan_end(&d.plan));
     IS(MBM_NOT_INITIALISED, mbm_plan_getStatus(&d.plan, 0, &age));
+}
+
+TEST(a_conversion_of_registers_refuses_null_and_what_the_registers_lack)
+{
+    static const mbm_planField fields[2] = {
+        {.unit = 1, .table = HOLDING, .type = MBM_TYPE_UINT16, .address = 1, .intervalMs = 1},
+        {.unit = 1, .table = HOLDING, .type = MBM_TYPE_FLOAT, .address = 1, .intervalMs = 1}};
+    static const mbm_planConversion real = {.powerField = 1, .flags = MBM_CONVERSION_POWER};
+    const uint16_t words[2] = {1, 2};
+    mbm_registers one, empty = {0};
+
+    assert_int_equal(mbm_registers_ofWords(&one, words, 2, 1), MBM_OK);
+    GETS(MBM_OK, mbm_registers_getConverted(&one, fields, 0, 0, NULL, &value.number));
+    GETS(MBM_OK, mbm_registers_getDecimal(&one, fields, 0, 0, NULL, 0, &value.int32));
+    IS(MBM_OK, mbm_registers_checkAvailable(&one, fields, 0, 0, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getConverted(&one, fields, 0, 0, NULL, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_getDecimal(&one, fields, 0, 0, NULL, 0, NULL));
+    GETS(MBM_INVALID_ARGUMENT, mbm_registers_getConverted(&one, NULL, 0, 0, NULL, &value.number));
+    GETS(MBM_INVALID_ARGUMENT, mbm_registers_getDecimal(NULL, fields, 0, 0, NULL, 0, &value.int32));
+    GETS(MBM_INVALID_ARGUMENT, mbm_registers_getDecimal(&one, fields, 1, 0, NULL, 0, &value.int32));
+    GETS(MBM_INVALID_ARGUMENT,
+         mbm_registers_getConverted(&one, fields, 0, 0, &real, &value.number));
+    GETS(MBM_NOT_INITIALISED, mbm_registers_getConverted(&empty, fields, 0, 0, NULL, &value.number));
+    IS(MBM_NOT_INITIALISED, mbm_registers_checkAvailable(&empty, fields, 0, 0, NULL));
+    assert_int_equal(mbm_registers_ofWords(&one, words, 1, 1), MBM_OK);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_checkAvailable(&one, fields, 1, 0, NULL));
 }
 
 /* --- calls from within the hooks of the client's port, from `done` of another request, and from

@@ -87,6 +87,8 @@ inline const __FlashStringHelper *modbusStatusText(uint8_t status)
         return F("the value is out of the range of its type");
     case MBM_CONNECT_TIMED_OUT:
         return F("the connection was not made in time");
+    case MBM_NOT_AVAILABLE:
+        return F("not available");
     case MBM_MALFORMED_VALUE:
         return F("the registers hold no value of this type");
     default:

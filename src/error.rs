@@ -145,6 +145,9 @@ errors {
     OUT_OF_RANGE = 0xF6, "the value is out of the range of its type";
     /// The connection was not made in time: the port has accepted no byte.
     CONNECT_TIMED_OUT = 0xF7, "the connection was not made in time";
+    /// The device has the value, and says that it is not available now: a number that its manual
+    /// reserves for that, or a float that is not a number.
+    NOT_AVAILABLE = 0xF8, "not available";
     /// The registers hold no value of the type that the caller asked for: a digit above 9, a date
     /// that does not exist.
     MALFORMED_VALUE = 0xF9, "the registers hold no value of this type";

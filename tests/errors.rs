@@ -85,7 +85,7 @@ fn statuses_with_a_name_have_a_text_of_their_own() {
         assert!(texts.insert(status.text()), "{status}");
         count += 1;
     }
-    assert_eq!(count, 32);
+    assert_eq!(count, 34);
 }
 
 #[test]

@@ -91,6 +91,9 @@ pub const MBM_OUT_OF_RANGE: u8 = 0xF6;
 /// The connection was not made in time: that of a link within its connect timeout. For a
 /// request on Modbus TCP without a link: the port accepted no byte within the response timeout.
 pub const MBM_CONNECT_TIMED_OUT: u8 = 0xF7;
+/// The device answered with the number that means "not available", or with a float that is not a
+/// number: there is no value. See mbm_planConversion.
+pub const MBM_NOT_AVAILABLE: u8 = 0xF8;
 /// The registers hold no value of the type in which the program reads them: a BCD digit above 9, a
 /// date that does not exist.
 pub const MBM_MALFORMED_VALUE: u8 = 0xF9;
@@ -128,6 +131,7 @@ statuses! {
     MBM_NO_PROGRESS = Status::NO_PROGRESS;
     MBM_OUT_OF_RANGE = Status::OUT_OF_RANGE;
     MBM_CONNECT_TIMED_OUT = Status::CONNECT_TIMED_OUT;
+    MBM_NOT_AVAILABLE = Status::NOT_AVAILABLE;
     MBM_MALFORMED_VALUE = Status::MALFORMED_VALUE;
 }
 

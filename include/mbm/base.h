@@ -142,6 +142,9 @@ const char *mbm_version(void);
 /** The connection was not made in time: that of a link within its connect timeout. For a
  *  request on Modbus TCP without a link: the port accepted no byte within the response timeout. */
 #define MBM_CONNECT_TIMED_OUT 247u
+/** The device answered with the number that means "not available", or with a float that is not a
+ *  number: there is no value. See mbm_planConversion. */
+#define MBM_NOT_AVAILABLE 248u
 /** The registers hold no value of the type in which the program reads them: a BCD digit above 9, a
  *  date that does not exist. */
 #define MBM_MALFORMED_VALUE 249u

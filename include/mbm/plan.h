@@ -15,6 +15,8 @@
 #if defined(__AVR__) && __SIZEOF_DOUBLE__ != 4
 /* The archive has a double of 32 bits: what calls these must not link. */
 #define mbm_plan_getNumber mbm_plan_getNumber_wants_mdouble_32
+#define mbm_plan_getConverted mbm_plan_getConverted_wants_mdouble_32
+#define mbm_registers_getConverted mbm_registers_getConverted_wants_mdouble_32
 #endif
 
 #ifdef __cplusplus
@@ -59,6 +61,12 @@ extern "C" {
 #define MBM_PLAN_LONGEST_INTERVAL 86400000
 /** The most fields of one plan. */
 #define MBM_PLAN_MAX_FIELDS 16383
+/** mbm_planConversion.flags: the number that SunSpec reserves in the type of the field means "not
+ *  available": 0x8000 of MBM_TYPE_INT16, 0xFFFF of MBM_TYPE_UINT16, the numbers like them of 32 and
+ *  64 bits; of a text that all its registers are 0. */
+#define MBM_CONVERSION_STANDARD 1u
+/** mbm_planConversion.flags: `powerField` has the power of ten. */
+#define MBM_CONVERSION_POWER 2u
 
 /**
  * A plan: a table of fields that a client reads from units again and again.
@@ -190,6 +198,34 @@ typedef struct mbm_planSetup {
     uint8_t excludedCount;
 } mbm_planSetup;
 
+/**
+ * What the numbers of a field mean, beyond what mbm_planField says of it: the value is number *
+ * multiplier / divisor * 10^power + offset, or it is not available. A float that is not a number
+ * is not available even without a conversion. A struct of zeros changes nothing else.
+ *
+ * It may be constant. A program that calls no function with a conversion does not contain them.
+ */
+typedef struct mbm_planConversion {
+    /** The numbers that mean "not available", as the bits that the registers have in
+     *  MBM_ORDER_ABCD: each has as many words as a value of the field has registers, the most
+     *  significant first. Of bits of a register each is the number that these bits are. NULL if
+     *  `notAvailableCount` is 0. A text has none. */
+    const uint16_t *notAvailable;
+    /** Is added, times 10^-`offsetDecimals`: -27315 with 2 decimals is -273.15. */
+    int32_t offset;
+    /** With MBM_CONVERSION_POWER: the index of the field that has the power of ten. That field has
+     *  an integer, the same unit, and no scale. If its number is not -10 to 10, the value is not
+     *  available. */
+    uint16_t powerField;
+    /** How many words there are in `notAvailable`: for a type of two registers twice as many as
+     *  numbers. */
+    uint16_t notAvailableCount;
+    /** 0 to 9. */
+    uint8_t offsetDecimals;
+    /** MBM_CONVERSION_..., added. */
+    uint8_t flags;
+} mbm_planConversion;
+
 /** A read of a plan: one request that it repeats. */
 typedef struct mbm_planReadInfo {
     /** The time from one read to the next, in milliseconds. */
@@ -260,6 +296,86 @@ uint8_t mbm_plan_beginGrouped(mbm_plan *plan, mbm_client *client, const mbm_plan
 
 /** Ends a plan: gives its requests up and lets go of its storage. */
 uint8_t mbm_plan_end(mbm_plan *plan);
+
+/**
+ * A value as a double, converted: with the multiplier and the divisor of its field, the power of
+ * ten and the offset, rounded once, to the nearest. On AVR, where C's double has 32 bits, it is
+ * rounded to these after that.
+ *
+ * The power and the number are of one reply if one read of the plan has both, as it has if they
+ * stand side by side with one interval.
+ *
+ * @param field       the index of the field, of a bit, an integer or a float
+ * @param index       which of its values, 0 for the first
+ * @param conversion  that of the field; NULL for none
+ * @param value       gets the number; a float that is infinite stays so
+ * @return a status; MBM_NOT_AVAILABLE if the device says that it has no value, if its power of ten
+ *         was never read, if that is not -10 to 10, or if the last read of the power failed
+ *         although that of the number did not; MBM_INVALID_ARGUMENT for a text or
+ *         MBM_TYPE_REGISTERS, and for a conversion that is not as it must be; if no value has
+ *         arrived yet the status that mbm_plan_getStatus returns
+ */
+uint8_t mbm_plan_getConverted(const mbm_plan *plan, uint16_t field, uint16_t index,
+                              const mbm_planConversion *conversion, double *value);
+
+/**
+ * As mbm_plan_getConverted, as an integer: the value times 10^`decimals`, rounded to the nearest,
+ * halves away from 0. It needs no arithmetic on floats: less code on a microcontroller.
+ *
+ * @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
+ * @param decimals  0 to 9: 21.5 is 215 with 1 decimal
+ * @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to it,
+ *         is too large: number * multiplier * 10^(power + decimals) must be below 2^60
+ */
+uint8_t mbm_plan_getDecimal(const mbm_plan *plan, uint16_t field, uint16_t index,
+                            const mbm_planConversion *conversion, uint8_t decimals, int32_t *value);
+
+/**
+ * Whether the last value that was read is available: for a value that the program takes in
+ * another way, such as with mbm_plan_getInt32 or mbm_plan_getText.
+ *
+ * @param field  the index of the field, of any type
+ * @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_plan_getConverted
+ */
+uint8_t mbm_plan_checkAvailable(const mbm_plan *plan, uint16_t field, uint16_t index,
+                                const mbm_planConversion *conversion);
+
+/**
+ * As mbm_plan_getConverted, for registers that a program has read without a plan.
+ *
+ * @param registers   the registers of the field, and of its power of ten
+ * @param fields      a table of fields, each as for mbm_plan_begin; they say where in the registers
+ *                    the numbers are; their unit does not count
+ * @param field       the index of the field in the table
+ * @param index       which of its values, 0 for the first
+ * @param conversion  that of the field; NULL for none
+ * @param value       gets the number
+ * @return as mbm_plan_getConverted; MBM_ILLEGAL_DATA_ADDRESS if `registers` lack one that is
+ *         needed; otherwise a status as mbm_plan_begin for the field; see mbm_registers
+ */
+uint8_t mbm_registers_getConverted(const mbm_registers *registers, const mbm_planField *fields,
+                                   uint16_t field, uint16_t index,
+                                   const mbm_planConversion *conversion, double *value);
+
+/**
+ * As mbm_plan_getDecimal, for registers that a program has read without a plan.
+ *
+ * @param decimals  0 to 9
+ * @return as mbm_registers_getConverted and mbm_plan_getDecimal
+ */
+uint8_t mbm_registers_getDecimal(const mbm_registers *registers, const mbm_planField *fields,
+                                 uint16_t field, uint16_t index,
+                                 const mbm_planConversion *conversion, uint8_t decimals,
+                                 int32_t *value);
+
+/**
+ * As mbm_plan_checkAvailable, for registers that a program has read without a plan.
+ *
+ * @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_registers_getConverted
+ */
+uint8_t mbm_registers_checkAvailable(const mbm_registers *registers, const mbm_planField *fields,
+                                     uint16_t field, uint16_t index,
+                                     const mbm_planConversion *conversion);
 
 /**
  * Takes the replies that have arrived, calls `update` for the fields of each read that has

@@ -7,6 +7,7 @@
 //! Nothing here sends anything or has a clock: time is an argument in milliseconds, which may
 //! wrap.
 
+pub mod conversion;
 #[doc(hidden)]
 pub mod divide;
 pub mod field;
@@ -16,7 +17,9 @@ mod number;
 mod read;
 pub mod schedule;
 pub mod value;
+mod wide;
 
+pub use conversion::Conversion;
 pub use field::Field;
 pub use limits::{ExcludedRange, Limits, ReadLimits, UnitLimits};
 pub use read::{Position, Read};

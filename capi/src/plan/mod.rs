@@ -1,12 +1,14 @@
 //! `mbm_plan_*`: a table of fields that is read from units again and again, for C.
 
 mod begin;
+mod conversion;
 mod object;
 mod poll;
 mod setup;
 mod values;
 
 pub use begin::*;
+pub use conversion::*;
 pub use poll::*;
 pub use setup::*;
 pub use values::*;

@@ -31,10 +31,10 @@ pub struct mbm_planReadInfo {
 }
 
 /// A field of a plan, and its read.
-struct Found<'a> {
+pub(super) struct Found<'a> {
     object: *mut Object,
     field: &'a Field,
-    read: &'a Read,
+    pub(super) read: &'a Read,
 }
 
 /// Finds a field. Returns [`Status::OK`] with `found` set, or says why not.
@@ -42,7 +42,11 @@ struct Found<'a> {
 /// # Safety
 /// `plan` is NULL or storage of a plan.
 #[inline(always)]
-unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>) -> Status {
+pub(super) unsafe fn find(
+    plan: *const mbm_plan,
+    field: u16,
+    found: &mut MaybeUninit<Found>,
+) -> Status {
     // Every field has a position and a read.
     match pointers::check(plan) {
         Status::OK => {}
@@ -68,7 +72,7 @@ unsafe fn find(plan: *const mbm_plan, field: u16, found: &mut MaybeUninit<Found>
 ///
 /// # Safety
 /// As for [`find`]; nothing changes the data while `words` lives.
-unsafe fn find_words(
+pub(super) unsafe fn find_words(
     plan: *const mbm_plan,
     field: u16,
     index: u16,

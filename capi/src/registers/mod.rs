@@ -97,7 +97,7 @@ fn code(result: Result<(), Error>) -> u8 {
 }
 
 /// The registers of an `mbm_registers`, as bytes in the order of the wire.
-struct BorrowedRegisters {
+pub(crate) struct BorrowedRegisters {
     bytes: *mut u8,
     length: usize,
     /// 1 if the machine stores the low byte of a word first, so that the two bytes of
@@ -132,7 +132,7 @@ impl RegisterBytesMut for BorrowedRegisters {
 /// # Safety
 /// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to as many
 /// words as the other fields say. Nothing else uses these words while the result lives.
-unsafe fn view(
+pub(crate) unsafe fn view(
     registers: *const mbm_registers,
     call_order: u8,
     to_write: bool,

@@ -144,6 +144,53 @@ fn get<T>(w: &World, name: &str, call: impl FnOnce(*mut T) -> u8) {
     }
 }
 
+/// A conversion, or NULL.
+fn conversion(w: &World) -> *const mbm_planConversion {
+    let numbers: Vec<u16> = (0..w.byte() % 6).map(|_| w.word()).collect();
+    let conversion = w.put(mbm_planConversion {
+        notAvailable: w.array(&numbers),
+        offset: w.long() as i32 >> (w.byte() % 32),
+        powerField: (w.byte() % 4).into(),
+        notAvailableCount: numbers.len() as u16,
+        offsetDecimals: w.byte() % 11,
+        flags: w.byte(),
+    });
+    w.null_or(8, || conversion)
+}
+
+/// Converts values of a plan, or of registers.
+fn convert(w: &World, plan: *mut mbm_plan) {
+    let (index, decimals) = (u16::from(w.byte() % 4), w.byte() % 11);
+    let fields: Vec<_> = (0..4).map(|_| field(w)).collect();
+    let fields = w.null_or(16, || w.array(&fields));
+    let (at, view, with) = (w.byte() % 4, w.views.pick(w), conversion(w));
+    let at = u16::from(at);
+    macro_rules! get {
+        ($name:ident($($argument:expr),*)) => {
+            get(w, stringify!($name), |value| call!(w, $name($($argument,)* value)))
+        };
+    }
+    match w.byte() % 6 {
+        0 => get!(mbm_plan_getConverted(plan, at, index, with)),
+        1 => get!(mbm_plan_getDecimal(plan, at, index, with, decimals)),
+        2 => {
+            let status = call!(w, mbm_plan_checkAvailable(plan, at, index, with));
+            is_status("mbm_plan_checkAvailable", status);
+        }
+        3 => get!(mbm_registers_getConverted(view, fields, at, index, with)),
+        4 => get!(mbm_registers_getDecimal(
+            view, fields, at, index, with, decimals
+        )),
+        _ => {
+            let status = call!(
+                w,
+                mbm_registers_checkAvailable(view, fields, at, index, with)
+            );
+            is_status("mbm_registers_checkAvailable", status);
+        }
+    }
+}
+
 fn look(w: &World, plan: *mut mbm_plan) {
     let (field, index) = (u16::from(w.byte() % 12), u16::from(w.byte() % 8));
     macro_rules! get {
@@ -200,7 +247,8 @@ pub fn step(w: &World) {
     match w.byte() % 16 {
         0 | 1 => begin(w, plan, client),
         2..=7 => run(w, plan, client),
-        8..=12 => look(w, plan),
+        8..=10 => look(w, plan),
+        11 | 12 => convert(w, plan),
         13 => {
             let field = u16::from(w.byte() % 12);
             checked!(w, mbm_plan_refresh(plan, field));
