@@ -4,7 +4,7 @@
 #define _GNU_SOURCE
 #include "asked.h"
 #include "await.h"
-#include "descriptors.h"
+#include "skip.h"
 #include "program.h"
 #include "pty.h"
 #include "tcp_server.h"

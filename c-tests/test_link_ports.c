@@ -5,7 +5,6 @@
 #define _GNU_SOURCE
 #include "await.h"
 #include "client.h"
-#include "fails.h"
 #include "pty.h"
 #include "tcp_peer.h"
 #include "tcp_server.h"

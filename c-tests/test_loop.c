@@ -2,9 +2,7 @@
  * beside libmodbus's server, and over UDP. */
 #define _GNU_SOURCE
 #include "await.h"
-#include "descriptors.h"
-#include "fails.h"
-#include "loop_until.h"
+#include "skip.h"
 #include "mbm_loop.h"
 #include "server.h"
 #include "tcp_peer.h"
@@ -146,7 +144,7 @@ TEST_WITH(many_clients_are_served_by_one_wait, begin, end)
 
     start_peers(PEERS);
     begin_devices(CLIENTS, REQUESTS);
-    UNTIL(&loop, all_are_right(CLIENTS, REQUESTS));
+    LOOP_UNTIL(&loop, all_are_right(CLIENTS, REQUESTS));
     for (unsigned i = 0; i < CLIENTS; i++) {
         assert_int_equal(devices[i].right, REQUESTS);
         assert_int_equal(devices[i].failed, 0);
@@ -166,7 +164,7 @@ TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
     silent->request.timeoutMs = 0;
     OK(mbm_client_setResponseTimeout(&silent->client, 150));
     uint32_t from = mbm_tcp_port(&silent->tcp).micros(&silent->tcp);
-    UNTIL(&loop, silent->failed == 1);
+    LOOP_UNTIL(&loop, silent->failed == 1);
     IS(MBM_RESPONSE_TIMED_OUT, silent->request.status);
     assert_true(mbm_tcp_port(&silent->tcp).micros(&silent->tcp) - from >= 150 * MS);
     assert_true(devices[0].right > 0 && devices[0].failed == 0);
@@ -177,24 +175,24 @@ TEST_WITH(a_link_that_is_lost_is_opened_and_waited_for_again, begin, end)
 {
     start_peers(1);
     begin_devices(4, 5);
-    UNTIL(&loop, all_are_right(4, 5));
+    LOOP_UNTIL(&loop, all_are_right(4, 5));
     for (unsigned round = 2; round <= 4; round++) {
         if (round % 2 == 0) {
             tcp_peer_hang_up(peers[0]);
         } else {
             tcp_peer_halt(peers[0]);
-            UNTIL(&loop, devices[0].counters.failed > 2 && devices[3].counters.failed > 2);
+            LOOP_UNTIL(&loop, devices[0].counters.failed > 2 && devices[3].counters.failed > 2);
             assert_int_equal(tcp_peer_start(peers[0], ports[0]), ports[0]);
         }
         for (unsigned i = 0; i < 4; i++)
-            UNTIL(&loop, devices[i].counters.connected >= round);
+            LOOP_UNTIL(&loop, devices[i].counters.connected >= round);
         for (unsigned i = 0; i < 4; i++) {
             devices[i].right = devices[i].failed = 0;
             devices[i].left = 5;
             ask(&devices[i]);
             mbm_loop_wake(&devices[i].entry);
         }
-        UNTIL(&loop, all_are_right(4, 5));
+        LOOP_UNTIL(&loop, all_are_right(4, 5));
     }
     for (unsigned i = 0; i < 4; i++)
         assert_true(devices[i].counters.lost >= 3);
@@ -204,13 +202,13 @@ TEST_WITH(a_request_that_is_queued_outside_needs_a_wake, begin, end)
 {
     start_peers(1);
     begin_devices(1, 0);
-    UNTIL(&loop, devices[0].counters.connected == 1);
+    LOOP_UNTIL(&loop, devices[0].counters.connected == 1);
     devices[0].left = 2;
     ask(&devices[0]);
     mbm_loop_wake(&devices[0].entry);
     mbm_loop_wake(&devices[0].entry);
     assert_int_equal(mbm_loop_pollDelay(&loop), 0);
-    UNTIL(&loop, devices[0].right == 2);
+    LOOP_UNTIL(&loop, devices[0].right == 2);
 }
 
 TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
@@ -230,7 +228,7 @@ TEST_WITH(without_a_descriptor_links_wait_and_connect_later, begin, end)
     assert_true(devices[3].counters.failed > 0);
     assert_int_equal(devices[3].tcp.error, EMFILE);
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    UNTIL(&loop, all_are_right(4, 5));
+    LOOP_UNTIL(&loop, all_are_right(4, 5));
 }
 
 /* --- entries that come and go --- */

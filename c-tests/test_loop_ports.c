@@ -2,9 +2,7 @@
  * listener. */
 #define _GNU_SOURCE
 #include "await.h"
-#include "descriptors.h"
-#include "fails.h"
-#include "loop_until.h"
+#include "skip.h"
 #include "mbm_loop.h"
 #include "server.h"
 #include "tcp_peer.h"
@@ -160,7 +158,7 @@ TEST(a_serial_line_takes_part_beside_tcp)
     prepare(&by_line, 20);
     assert_int_equal(mbm_loop_addTty(&loop, &by_line.entry, &tty), 0);
     begin_tcp(tcp_peer_start(peer, 0), 100);
-    UNTIL(&loop, by_line.right == 20 && by_tcp.right == 100);
+    LOOP_UNTIL(&loop, by_line.right == 20 && by_tcp.right == 100);
     for (unsigned i = 0; i < WORDS; i++) {
         assert_int_equal(by_line.words[i], server_pattern(i));
         assert_int_equal(by_tcp.words[i], tcp_peer_word(i));
@@ -210,7 +208,7 @@ TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
     to.sin_port = htons(udp_server.port);
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     assert_int_equal(sendto(sender, "x", 1, 0, (struct sockaddr *)&to, sizeof to), 1);
-    UNTIL(&loop, line_polls == 2 && udp_polls == 2 && stream_polls == 2);
+    LOOP_UNTIL(&loop, line_polls == 2 && udp_polls == 2 && stream_polls == 2);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     /* Once the program has used the port, and polled the entry, the rest is reported. */
@@ -218,12 +216,12 @@ TEST(bytes_that_are_not_read_do_not_end_the_wait_again)
     assert_int_equal(datagrams.read(datagrams.context, bytes, 2), 0);
     mbm_loop_wake(&line);
     mbm_loop_wake(&udp);
-    UNTIL(&loop, line_polls == 4);
+    LOOP_UNTIL(&loop, line_polls == 4);
     assert_int_equal(udp_polls, 3);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     assert_int_equal(stream_polls, 2);
     assert_int_equal(sockets.read(sockets.context, bytes, 2), 2);
-    UNTIL(&loop, stream_polls == 3);
+    LOOP_UNTIL(&loop, stream_polls == 3);
     assert_int_equal(mbm_loop_wait(&loop, 1000), 0);
     mbm_loop_remove(&stream);
     close(pair[1]);
@@ -327,16 +325,16 @@ TEST(servers_and_clients_share_a_loop)
 {
     begin_to_listen();
     begin_tcp(listener.port, 50);
-    UNTIL(&loop, by_tcp.right == 50);
+    LOOP_UNTIL(&loop, by_tcp.right == 50);
     assert_memory_equal(by_tcp.words, words, sizeof words);
     assert_int_equal(places_in_use(), 1);
     /* The client goes: its place is free. */
     mbm_loop_remove(&by_tcp.entry);
     mbm_tcp_close(&tcp);
-    UNTIL(&loop, places_in_use() == 0);
+    LOOP_UNTIL(&loop, places_in_use() == 0);
     assert_int_equal(loop.count, 1);
     begin_tcp(listener.port, 0);
-    UNTIL(&loop, by_tcp.counters.connected == 2 && places_in_use() == 1);
+    LOOP_UNTIL(&loop, by_tcp.counters.connected == 2 && places_in_use() == 1);
     end_listening();
 }
 
@@ -344,9 +342,9 @@ TEST(bytes_that_are_no_modbus_end_the_connection_of_a_server)
 {
     begin_to_listen();
     int peer = tcp_connect(listener.port);
-    UNTIL(&loop, places_in_use() == 1);
+    LOOP_UNTIL(&loop, places_in_use() == 1);
     assert_int_equal(write(peer, "GET / HTTP/1.1\r\n\r\n", 18), 18);
-    UNTIL(&loop, places_in_use() == 0);
+    LOOP_UNTIL(&loop, places_in_use() == 0);
     close(peer);
     end_listening();
 }
@@ -359,7 +357,7 @@ TEST(without_a_descriptor_connections_wait_and_are_accepted_later)
     SKIP_WITHOUT_LIMITS();
     begin_to_listen();
     peers[0] = tcp_connect(listener.port);
-    UNTIL(&loop, places_in_use() == 1);
+    LOOP_UNTIL(&loop, places_in_use() == 1);
     for (i = 1; i < 3; i++)
         peers[i] = tcp_connect(listener.port);
     /* The spare descriptor is gone too, so the connections cannot even be closed. */
@@ -373,10 +371,10 @@ TEST(without_a_descriptor_connections_wait_and_are_accepted_later)
     assert_int_equal(places_in_use(), 1);
     assert_int_equal(listener.refused, 0);
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &found), 0);
-    UNTIL(&loop, places_in_use() == 3);
+    LOOP_UNTIL(&loop, places_in_use() == 3);
     for (i = 0; i < 3; i++)
         close(peers[i]);
-    UNTIL(&loop, places_in_use() == 0);
+    LOOP_UNTIL(&loop, places_in_use() == 0);
     close(next);
     end_listening();
 }
@@ -411,7 +409,7 @@ TEST(a_server_on_a_serial_line_takes_part)
     begin_unit();
     begin_far_end();
     begin_line(line.path, 20);
-    UNTIL(&loop, by_line.right == 20);
+    LOOP_UNTIL(&loop, by_line.right == 20);
     assert_memory_equal(by_line.words, words, sizeof words);
     end_far_end();
 }
@@ -427,19 +425,19 @@ TEST(a_terminal_that_comes_back_is_waited_for_again)
     snprintf(path, sizeof path, "%s/tty", folder);
     begin_line(path, 0);
     for (unsigned round = 1; round <= 3; round++) {
-        UNTIL(&loop, by_line.counters.failed >= 2 * round);
+        LOOP_UNTIL(&loop, by_line.counters.failed >= 2 * round);
         begin_far_end();
         assert_int_equal(symlink(line.path, path), 0);
-        UNTIL(&loop, by_line.counters.connected == round);
+        LOOP_UNTIL(&loop, by_line.counters.connected == round);
         assert_int_equal(by_line.entry.fd, tty.fd);
         by_line.left = 3;
         by_line.right = 0;
         ask(&by_line);
         mbm_loop_wake(&by_line.entry);
-        UNTIL(&loop, by_line.right == 3);
+        LOOP_UNTIL(&loop, by_line.right == 3);
         unlink(path);
         end_far_end();
-        UNTIL(&loop, by_line.counters.lost == round);
+        LOOP_UNTIL(&loop, by_line.counters.lost == round);
         taken[round - 1] = dup(0);
     }
     for (unsigned round = 0; round < 3; round++)
@@ -466,7 +464,7 @@ TEST(a_client_and_a_server_over_udp_take_part)
                            by_udp.outgoing, sizeof by_udp.outgoing));
     prepare(&by_udp, 50);
     assert_int_equal(mbm_loop_addUdp(&loop, &by_udp.entry, &udp_client), 0);
-    UNTIL(&loop, by_udp.right == 50);
+    LOOP_UNTIL(&loop, by_udp.right == 50);
     assert_memory_equal(by_udp.words, words, sizeof words);
     /* No poll more than the requests need: one to begin, one for each reply. */
     assert_in_range(by_udp.polls, 50, 60);

@@ -1,6 +1,5 @@
 /* The times of a loop: thousands of entries without descriptors, on a clock of the test's. */
 #define _GNU_SOURCE
-#include "fails.h"
 #include "mbm_loop.h"
 #include "test.h"
 

@@ -1,6 +1,24 @@
 /* Records that are given to a mbm_server_serve function a second time: for the same unit,
- * zeroed before or not, and for another unit. */
-#include "answer.h"
+ * zeroed before or not, and for another unit; and tables that their hooks change. */
+#include "crc.h"
+#include "mbm.h"
+#include "test.h"
+
+/* Lets a unit serve a PDU in an RTU frame to the unit `id`. Returns the function code of the
+ * response, or 0 if there is none. */
+static unsigned answer(mbm_unit *unit, uint8_t id, const char *pdu, size_t length)
+{
+    uint8_t frame[MBM_MAX_FRAME];
+    uint16_t response = 0xFFFF;
+
+    frame[0] = id;
+    memcpy(frame + 1, pdu, length);
+    length = seal(frame, length + 1);
+    OK(mbm_unit_respond(unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, (uint16_t)length,
+                        sizeof frame, &response));
+    assert_int_not_equal(response, 0xFFFF);
+    return response == 0 ? 0 : frame[1];
+}
 
 enum { FAMILIES = 11 };
 
@@ -365,3 +383,123 @@ TEST(switches_can_be_registered_again_like_any_record)
     OK(mbm_unit_switchFunction(&units[0], &first.switches, 4, 1));
     all_are_answered(&units[0]);
 }
+
+/* --- hooks that change their own table while a request is carried out, which goes on with the
+ * table as it was --- */
+
+/* The table is on the heap, so that the sanitizer finds an access beyond its end. */
+static mbm_registerTable *changing;
+static mbm_unit hooked_unit;
+static uint16_t cells[4];
+static uint16_t fewer[1];
+
+static uint8_t zero_before(void *context, const mbm_access *access)
+{
+    memset(changing, 0, sizeof *changing);
+    return 0;
+}
+
+static uint8_t shrink_before(void *context, const mbm_access *access)
+{
+    zero_before(context, access);
+    changing->words = fewer;
+    changing->size = 1;
+    OK(mbm_unit_serveHoldingRegisters(&hooked_unit, changing));
+    return 0;
+}
+
+static void shrink_after(void *context, const mbm_access *access)
+{
+    shrink_before(context, access);
+}
+
+static uint8_t become_bits(void *context, const mbm_access *access)
+{
+    static uint8_t bit[1];
+    mbm_bitTable *other = (mbm_bitTable *)(void *)changing;
+
+    zero_before(context, access);
+    other->bits = bit;
+    other->size = 8;
+    OK(mbm_unit_serveCoils(&hooked_unit, other));
+    return 0;
+}
+
+/* Serves four registers with these hooks, from new. */
+static void serve_hooked(const mbm_accessHooks *hooks)
+{
+    memset(&hooked_unit, 0, sizeof hooked_unit);
+    hooked_unit.id = 17;
+    memset(changing, 0, sizeof *changing);
+    changing->words = cells;
+    changing->size = 4;
+    cells[3] = 0x00F0;
+    OK(mbm_registerTable_setHooks(changing, hooks));
+    OK(mbm_unit_serveHoldingRegisters(&hooked_unit, changing));
+    OK(mbm_registerTable_serveMaskAndReadWrite(changing));
+}
+
+TEST(a_write_goes_on_with_the_old_table_if_its_hook_changes_it)
+{
+    static const mbm_accessHooks hooks[] = {
+        {.beforeWrite = zero_before},
+        {.beforeWrite = shrink_before},
+        {.beforeWrite = become_bits},
+    };
+
+    for (int i = 0; i < 3; i++) {
+        serve_hooked(&hooks[i]);
+        assert_int_equal(answer(&hooked_unit, 17, "\x10\0\0\0\4\x08\0\1\0\2\0\3\0\4", 14), 0x10);
+        assert_int_equal(cells[3], 4);
+        assert_int_equal(fewer[0], 0);
+    }
+}
+
+TEST(function_17_reads_from_the_old_table_if_the_hook_after_its_write_changes_it)
+{
+    static const mbm_accessHooks hooks = {.afterWrite = shrink_after};
+
+    serve_hooked(&hooks);
+    assert_int_equal(answer(&hooked_unit, 17, "\x17\0\0\0\4\0\0\0\1\2\0\1", 12), 0x17);
+}
+
+/* Each function that reads, with a hook before the read. */
+TEST(a_read_goes_on_with_the_old_table_if_its_hook_changes_it)
+{
+    static const mbm_accessHooks hooks[] = {
+        {.beforeRead = zero_before},
+        {.beforeRead = shrink_before},
+        {.beforeRead = become_bits},
+    };
+    static const struct {
+        const char *pdu;
+        size_t length;
+        uint16_t last; /* the last register afterwards */
+    } reads[] = {
+        {"\3\0\0\0\4", 5, 0x00F0},
+        {"\x16\0\3\0\xFF\x0F\0", 7, 0x0FF0},
+        {"\x17\0\0\0\4\0\3\0\1\2\x0F\xF0", 12, 0x0FF0},
+    };
+
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            serve_hooked(&hooks[j]);
+            assert_int_equal(answer(&hooked_unit, 17, reads[i].pdu, reads[i].length),
+                             reads[i].pdu[0]);
+            assert_int_equal(cells[3], reads[i].last);
+            assert_int_equal(fewer[0], 0);
+        }
+}
+
+static void make_table(void)
+{
+    changing = (mbm_registerTable *)malloc(sizeof *changing);
+    assert_non_null(changing);
+}
+
+static void free_table(void)
+{
+    free(changing);
+}
+
+fixture all_tests = {make_table, free_table};

@@ -59,14 +59,6 @@ static void reset(void)
 
 fixture each_test = {reset, NULL};
 
-/* The result of a libmodbus call that an exception answers. */
-#define EXCEPTION(code, call)                                                                      \
-    do {                                                                                           \
-        errno = 0;                                                                                 \
-        assert_int_equal(call, -1);                                                                \
-        assert_int_equal(errno, MODBUS_ENOBASE + (code));                                          \
-    } while (0)
-
 static void reads_are_refused_by(modbus_t *client, uint8_t code)
 {
     uint16_t words[4];

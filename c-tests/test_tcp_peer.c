@@ -2,7 +2,7 @@
  * tests of clients is the client's fault. */
 #define _GNU_SOURCE
 #include "await.h"
-#include "emulated.h"
+#include "skip.h"
 #include "tcp_peer.h"
 #include "tcp_server.h"
 #include "test.h"

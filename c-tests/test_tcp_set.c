@@ -1,8 +1,7 @@
 /* A set of sockets: one wait for any number of them, which says which of them are ready. */
 #define _GNU_SOURCE
 #include "await.h"
-#include "descriptors.h"
-#include "fails.h"
+#include "skip.h"
 #include "mbm_tcp.h"
 #include "tcp_peer.h"
 #include "tcp_server.h"

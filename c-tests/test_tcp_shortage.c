@@ -2,7 +2,7 @@
  * program sleeps, and waiting connections are accepted when there is a free place again. */
 #define _GNU_SOURCE
 #include "await.h"
-#include "descriptors.h"
+#include "skip.h"
 #include "mbm_tcp.h"
 #include "tcp_server.h"
 #include "tcp_waiting.h"

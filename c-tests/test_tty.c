@@ -3,8 +3,7 @@
 #define _GNU_SOURCE
 #include "await.h"
 #include "clock.h"
-#include "emulated.h"
-#include "fails.h"
+#include "skip.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "test.h"

@@ -2,7 +2,7 @@
 #include "asked.h"
 #include "await.h"
 #include "crc.h"
-#include "fails.h"
+#include "test.h"
 
 #include <poll.h>
 #include <sys/socket.h>

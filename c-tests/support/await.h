@@ -25,6 +25,13 @@ enum { PATIENCE_MS = 20000 };
         }                                                                                          \
     } while (0)
 
+/* Lets a loop of ports/linux wait until a condition holds. */
+#define LOOP_UNTIL(loop, condition)                                                                \
+    do {                                                                                           \
+        while (!(condition))                                                                       \
+            assert_true(mbm_loop_wait((loop), MBM_LOOP_FOREVER) >= 0);                             \
+    } while (0)
+
 /* Reads exactly `count` bytes from a descriptor, as they arrive. */
 static inline void await_bytes(int fd, uint8_t *bytes, size_t count)
 {

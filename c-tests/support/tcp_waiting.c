@@ -1,7 +1,7 @@
 #define _GNU_SOURCE
 #include "tcp_waiting.h"
 #include "await.h"
-#include "emulated.h"
+#include "skip.h"
 #include "must.h"
 #include "tcp_server.h"
 

@@ -3,6 +3,7 @@
 #ifndef TEST_H
 #define TEST_H
 
+#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -45,6 +46,17 @@ void test_add(const char *name, void (*test)(void), void (*setup)(void), void (*
 /* Compares the status that a function of mbm.h returns. */
 #define IS(status, call) assert_int_equal(call, status)
 #define OK(call) IS(MBM_OK, call)
+
+/* Asserts that a call returns -1 and sets errno. */
+#define FAILS(error, call)                                                                         \
+    do {                                                                                           \
+        errno = 0;                                                                                 \
+        assert_int_equal(call, -1);                                                                \
+        assert_int_equal(errno, error);                                                            \
+    } while (0)
+
+/* Asserts that a call of libmodbus gets an exception. Include modbus.h first. */
+#define EXCEPTION(code, call) FAILS(MODBUS_ENOBASE + (code), call)
 
 /* A framing of the mbm_frame functions: one of MBM_FRAMING_, or PDUs alone with functions. */
 #define FRAMING(code) (&(const mbm_framing){.kind = (code)})

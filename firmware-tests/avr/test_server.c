@@ -1,7 +1,6 @@
 /* Sketches with a server on simulated boards. A libmodbus client sends the requests. */
 #include "bus.h"
 #include "crc.h"
-#include "fails.h"
 #include "kind.h"
 #include "mbm.h"
 #include "test.h"

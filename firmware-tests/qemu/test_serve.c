@@ -5,7 +5,6 @@
 #define _GNU_SOURCE
 #include "clock.h"
 #include "crc.h"
-#include "fails.h"
 #include "machine.h"
 #include "mbm.h"
 #include "pty.h"
