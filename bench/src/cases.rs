@@ -130,311 +130,77 @@ macro_rules! function {
     }};
 }
 
+/// The rows of each function: its name, a request and a response, what rmodbus is asked, and whether
+/// mbm's model and libmodbus's server answer.
+macro_rules! functions {
+    ($rows:ident, $framing:ident; $($name:literal => $request:expr, $response:expr, $ask:expr, $served:expr;)*) => {
+        $(function!($rows, $framing, $name, $request, $response, $ask, $served);)*
+    };
+}
+
 fn rows_of(framing: Framing, rows: &mut Vec<Row>) {
-    function!(
-        rows,
-        framing,
-        "01 Read Coils, 19",
-        Request::ReadBits {
-            function: 1,
-            address: black_box(16),
-            quantity: black_box(19)
-        },
-        Response::ReadBits {
-            function: 1,
-            data: black_box(COILS)
-        },
-        Some(Ask::Coils(16, 19)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "02 Read Discrete Inputs, 19",
-        Request::ReadBits {
-            function: 2,
-            address: black_box(16),
-            quantity: black_box(19)
-        },
-        Response::ReadBits {
-            function: 2,
-            data: black_box(COILS)
-        },
-        Some(Ask::Discretes(16, 19)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "03 Read Holding Registers, 10",
-        Request::ReadRegisters {
-            function: 3,
-            address: black_box(107),
-            quantity: black_box(10)
-        },
-        Response::ReadRegisters {
-            function: 3,
-            data: black_box(WORDS)
-        },
-        Some(Ask::Holdings(107, 10)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "03 Read Holding Registers, 125",
-        Request::ReadRegisters {
-            function: 3,
-            address: black_box(107),
-            quantity: black_box(125)
-        },
-        Response::ReadRegisters {
-            function: 3,
-            data: black_box(MOST)
-        },
-        Some(Ask::Holdings(107, 125)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "04 Read Input Registers, 10",
-        Request::ReadRegisters {
-            function: 4,
-            address: black_box(107),
-            quantity: black_box(10)
-        },
-        Response::ReadRegisters {
-            function: 4,
-            data: black_box(WORDS)
-        },
-        Some(Ask::Inputs(107, 10)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "05 Write Single Coil",
-        Request::WriteSingleCoil {
-            address: black_box(172),
-            on: black_box(true)
-        },
-        Response::WriteSingleCoil {
-            address: black_box(172),
-            on: black_box(true)
-        },
-        Some(Ask::SetCoil(172)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "06 Write Single Register",
-        Request::WriteSingleRegister {
-            address: black_box(1),
-            value: black_box(3)
-        },
-        Response::WriteSingleRegister {
-            address: black_box(1),
-            value: black_box(3)
-        },
-        Some(Ask::SetHolding(1, 3)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "0F Write Multiple Coils, 19",
-        Request::WriteMultipleCoils {
-            address: black_box(16),
-            quantity: black_box(19),
-            data: black_box(COILS)
-        },
-        Response::WriteMultiple {
-            function: 15,
-            address: black_box(16),
-            quantity: black_box(19)
-        },
-        Some(Ask::SetCoils(16, &ON)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "10 Write Multiple Registers, 10",
-        Request::WriteMultipleRegisters {
-            address: black_box(1),
-            quantity: black_box(10),
-            data: black_box(WORDS)
-        },
-        Response::WriteMultiple {
-            function: 16,
-            address: black_box(1),
-            quantity: black_box(10)
-        },
-        Some(Ask::SetHoldings(1, &VALUES)),
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "16 Mask Write Register",
-        Request::MaskWriteRegister {
-            address: black_box(4),
-            and_mask: black_box(0xF2),
-            or_mask: black_box(0x25)
-        },
-        Response::MaskWriteRegister {
-            address: black_box(4),
-            and_mask: black_box(0xF2),
-            or_mask: black_box(0x25)
-        },
-        None,
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "17 Read/Write Multiple Registers, 10",
-        Request::ReadWriteMultipleRegisters {
-            read_address: black_box(3),
-            read_quantity: black_box(10),
-            write_address: black_box(14),
-            write_quantity: black_box(10),
-            data: black_box(WORDS)
-        },
-        Response::ReadRegisters {
-            function: 0x17,
-            data: black_box(WORDS)
-        },
-        None,
-        true
-    );
-    function!(
-        rows,
-        framing,
-        "07 Read Exception Status",
-        Request::ReadExceptionStatus,
-        Response::ExceptionStatus {
-            outputs: black_box(0x6D)
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "08 Diagnostics",
-        Request::Diagnostics {
-            sub_function: black_box(0),
-            data: black_box(&[0xA5, 0x37])
-        },
-        Response::Diagnostics {
-            sub_function: black_box(0),
-            data: black_box(&[0xA5, 0x37])
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "0B Get Comm Event Counter",
-        Request::GetCommEventCounter,
-        Response::CommEventCounter {
-            status: black_box(0),
-            events: black_box(0x108)
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "0C Get Comm Event Log, 2",
-        Request::GetCommEventLog,
-        Response::CommEventLog {
-            status: black_box(0),
-            events: black_box(0x108),
-            messages: black_box(0x121),
-            log: black_box(&[0x20, 0])
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "11 Report Server ID",
-        Request::ReportServerId,
-        Response::ServerId {
-            count: black_box(4),
-            data: black_box(b"abc\xFF")
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "14 Read File Record, 2 groups",
-        Request::ReadFileRecord(
-            Reads::new(black_box(&[6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 2])).expect("in order")
-        ),
-        Response::ReadFileRecord(
-            Records::new(black_box(&[5, 6, 13, 254, 0, 32, 5, 6, 51, 205, 0, 64]))
-                .expect("in order")
-        ),
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "15 Write File Record, 3 records",
-        Request::WriteFileRecord(
-            Writes::new(black_box(&[6, 0, 4, 0, 7, 0, 3, 6, 175, 4, 190, 16, 13]))
-                .expect("in order")
-        ),
-        Response::WriteFileRecord(
-            Writes::new(black_box(&[6, 0, 4, 0, 7, 0, 3, 6, 175, 4, 190, 16, 13]))
-                .expect("in order")
-        ),
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "18 Read FIFO Queue, 2",
-        Request::ReadFifoQueue {
-            address: black_box(0x04DE)
-        },
-        Response::FifoQueue {
-            data: black_box(&[1, 184, 18, 132])
-        },
-        None,
-        false
-    );
-    function!(
-        rows,
-        framing,
-        "2B/0E Read Device Identification, 3 objects",
-        Request::ReadDeviceIdentification {
-            code: black_box(1),
-            object: black_box(0)
-        },
-        Response::DeviceIdentification {
-            code: black_box(1),
-            conformity: black_box(0x83),
-            more_follows: false,
-            next_object: 0,
-            objects: ObjectList::new(3, black_box(b"\x00\x01a\x01\x02bc\x02\x03def"))
-                .expect("in order")
-        },
-        None,
-        false
-    );
+    functions! { rows, framing;
+        "01 Read Coils, 19" =>
+            Request::ReadBits { function: 1, address: black_box(16), quantity: black_box(19) },
+            Response::ReadBits { function: 1, data: black_box(COILS) }, Some(Ask::Coils(16, 19)), true;
+        "02 Read Discrete Inputs, 19" =>
+            Request::ReadBits { function: 2, address: black_box(16), quantity: black_box(19) },
+            Response::ReadBits { function: 2, data: black_box(COILS) }, Some(Ask::Discretes(16, 19)), true;
+        "03 Read Holding Registers, 10" =>
+            Request::ReadRegisters { function: 3, address: black_box(107), quantity: black_box(10) },
+            Response::ReadRegisters { function: 3, data: black_box(WORDS) }, Some(Ask::Holdings(107, 10)), true;
+        "03 Read Holding Registers, 125" =>
+            Request::ReadRegisters { function: 3, address: black_box(107), quantity: black_box(125) },
+            Response::ReadRegisters { function: 3, data: black_box(MOST) }, Some(Ask::Holdings(107, 125)), true;
+        "04 Read Input Registers, 10" =>
+            Request::ReadRegisters { function: 4, address: black_box(107), quantity: black_box(10) },
+            Response::ReadRegisters { function: 4, data: black_box(WORDS) }, Some(Ask::Inputs(107, 10)), true;
+        "05 Write Single Coil" =>
+            Request::WriteSingleCoil { address: black_box(172), on: black_box(true) },
+            Response::WriteSingleCoil { address: black_box(172), on: black_box(true) }, Some(Ask::SetCoil(172)), true;
+        "06 Write Single Register" =>
+            Request::WriteSingleRegister { address: black_box(1), value: black_box(3) },
+            Response::WriteSingleRegister { address: black_box(1), value: black_box(3) }, Some(Ask::SetHolding(1, 3)), true;
+        "0F Write Multiple Coils, 19" =>
+            Request::WriteMultipleCoils { address: black_box(16), quantity: black_box(19), data: black_box(COILS) },
+            Response::WriteMultiple { function: 15, address: black_box(16), quantity: black_box(19) }, Some(Ask::SetCoils(16, &ON)), true;
+        "10 Write Multiple Registers, 10" =>
+            Request::WriteMultipleRegisters { address: black_box(1), quantity: black_box(10), data: black_box(WORDS) },
+            Response::WriteMultiple { function: 16, address: black_box(1), quantity: black_box(10) }, Some(Ask::SetHoldings(1, &VALUES)), true;
+        "16 Mask Write Register" =>
+            Request::MaskWriteRegister { address: black_box(4), and_mask: black_box(0xF2), or_mask: black_box(0x25) },
+            Response::MaskWriteRegister { address: black_box(4), and_mask: black_box(0xF2), or_mask: black_box(0x25) }, None, true;
+        "17 Read/Write Multiple Registers, 10" =>
+            Request::ReadWriteMultipleRegisters { read_address: black_box(3), read_quantity: black_box(10), write_address: black_box(14), write_quantity: black_box(10), data: black_box(WORDS) },
+            Response::ReadRegisters { function: 0x17, data: black_box(WORDS) }, None, true;
+        "07 Read Exception Status" =>
+            Request::ReadExceptionStatus,
+            Response::ExceptionStatus { outputs: black_box(0x6D) }, None, false;
+        "08 Diagnostics" =>
+            Request::Diagnostics { sub_function: black_box(0), data: black_box(&[0xA5, 0x37]) },
+            Response::Diagnostics { sub_function: black_box(0), data: black_box(&[0xA5, 0x37]) }, None, false;
+        "0B Get Comm Event Counter" =>
+            Request::GetCommEventCounter,
+            Response::CommEventCounter { status: black_box(0), events: black_box(0x108) }, None, false;
+        "0C Get Comm Event Log, 2" =>
+            Request::GetCommEventLog,
+            Response::CommEventLog { status: black_box(0), events: black_box(0x108), messages: black_box(0x121), log: black_box(&[0x20, 0]) }, None, false;
+        "11 Report Server ID" =>
+            Request::ReportServerId,
+            Response::ServerId { count: black_box(4), data: black_box(b"abc\xFF") }, None, false;
+        "14 Read File Record, 2 groups" =>
+            Request::ReadFileRecord(Reads::new(black_box(&[6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 2])).expect("in order")),
+            Response::ReadFileRecord(Records::new(black_box(&[5, 6, 13, 254, 0, 32, 5, 6, 51, 205, 0, 64])).expect("in order")), None, false;
+        "15 Write File Record, 3 records" =>
+            Request::WriteFileRecord(Writes::new(black_box(&[6, 0, 4, 0, 7, 0, 3, 6, 175, 4, 190, 16, 13])).expect("in order")),
+            Response::WriteFileRecord(Writes::new(black_box(&[6, 0, 4, 0, 7, 0, 3, 6, 175, 4, 190, 16, 13])).expect("in order")), None, false;
+        "18 Read FIFO Queue, 2" =>
+            Request::ReadFifoQueue { address: black_box(0x04DE) },
+            Response::FifoQueue { data: black_box(&[1, 184, 18, 132]) }, None, false;
+        "2B/0E Read Device Identification, 3 objects" =>
+            Request::ReadDeviceIdentification { code: black_box(1), object: black_box(0) },
+            Response::DeviceIdentification { code: black_box(1), conformity: black_box(0x83), more_follows: false, next_object: 0, objects: ObjectList::new(3, black_box(b"\x00\x01a\x01\x02bc\x02\x03def")).expect("in order") }, None, false;
+    }
 }
 
 /// All rows.
