@@ -124,7 +124,7 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S $(wil
 
 # --- the programs that run the sketches
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus kind peer sketch server pty tcp_server)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus peer sketch server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(TEST_WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 

@@ -3,7 +3,7 @@
  * requests to its server, and its master to a libmodbus server. */
 #include "bus.h"
 #include "crc.h"
-#include "kind.h"
+#include "sketch.h"
 #include "peer.h"
 #include "test.h"
 

@@ -2,7 +2,7 @@
  * firmware-tests/avr/libraries have a UART as their connection. This test carries its bytes
  * to the sockets of a real libmodbus. */
 #define _GNU_SOURCE
-#include "kind.h"
+#include "sketch.h"
 #include "peer.h"
 #include "tcp_server.h"
 #include "test.h"

@@ -1,7 +1,7 @@
 /* Sketches with a server on simulated boards. A libmodbus client sends the requests. */
 #include "bus.h"
 #include "crc.h"
-#include "kind.h"
+#include "sketch.h"
 #include "mbm.h"
 #include "test.h"
 

@@ -1,6 +1,5 @@
 /* The examples and a few more sketches, compiled as the IDE does, on simulated boards with
  * a libmodbus server. */
-#include "kind.h"
 #include "peer.h"
 #include "sketch.h"
 #include "test.h"

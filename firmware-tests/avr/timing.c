@@ -8,6 +8,14 @@
 
 #include <stdio.h>
 
+board *timed_board(const char *folder, const char *name)
+{
+    char path[200];
+
+    snprintf(path, sizeof path, "build/avr/%s/%s.elf", folder, name);
+    return board_new(path, "atmega328p");
+}
+
 int main(int count, char **arguments)
 {
     time_master(count > 1 ? arguments[1] : NULL);

@@ -1,7 +1,7 @@
 /* The examples of ModbusMaster 2.0.1 and those of its manual for 0.9, as they are, on simulated
  * boards against a real libmodbus server. They are not part of this repository:
  * `make test-firmware-upstream` compiles them from a folder. */
-#include "kind.h"
+#include "sketch.h"
 #include "test.h"
 #include "upstream_device.h"
 

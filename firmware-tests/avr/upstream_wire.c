@@ -3,7 +3,7 @@
  *     upstream_wire EXAMPLE UNIT     a row of docs/reports/timing.md for each board
  *
  * It fails if a byte differs. The times are those of the simulated board. */
-#include "kind.h"
+#include "sketch.h"
 #include "test.h"
 #include "upstream_device.h"
 

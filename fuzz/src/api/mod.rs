@@ -22,7 +22,6 @@ mod node;
 mod packet;
 mod plan;
 mod pool;
-mod port;
 mod ports;
 mod prepared;
 mod records;
