@@ -7,6 +7,25 @@
 #include <inttypes.h>
 #include <math.h>
 
+/* Each text of a list, in which bars are between them. */
+#define EACH(text, list)                                                                           \
+    for (const char *rest_ = (list), *text; (text = next_text(&rest_)) != NULL;)
+
+static const char *next_text(const char **rest)
+{
+    static char text[100];
+    size_t length;
+
+    if (*rest == NULL)
+        return NULL;
+    length = strcspn(*rest, "|");
+    assert_true(length < sizeof text);
+    memcpy(text, *rest, length);
+    text[length] = '\0';
+    *rest = (*rest)[length] == '|' ? *rest + length + 1 : NULL;
+    return text;
+}
+
 static uint16_t words[VALUE_WORDS];
 static const char *wrong;
 
@@ -60,114 +79,28 @@ static void expect_refused(uint8_t type, const char *scale, const char *payload,
     assert_non_null(strstr(wrong, reason));
 }
 
-/* Every type refuses these. */
-static const char *const NO_NUMBERS[] = {
-    "21,5",
-    "0x10",
-    "12abc",
-    "5 6 7",
-    "1x",
-    "x1",
-    "+5",
-    ".5",
-    "5.",
-    "05",
-    "-",
-    "--1",
-    "- 1",
-    "1e",
-    "1e+",
-    "1.e5",
-    "1e5.0",
-    "1_000",
-    "1,000",
-    "1'000",
-    "0b1",
-    "0o7",
-    "1f",
-    "1.0f",
-    "1L",
-    "NaN",
-    "nan",
-    "Inf",
-    "inf",
-    "-inf",
-    "Infinity",
-    "-Infinity",
-    "null",
-    "hot",
-    "\"5\"",
-    "[5]",
-    "[]",
-    "{}",
-    "5;",
-    "5\n6",
-    "\357\273\2775", /* a byte order mark, as octal digits end after three */
-    "\302\2405",     /* a space that does not break */
-    "\xd9\xa5",
-    "1\v",
-    "\f1",
-    " ",
-    "\n",
-    "truetrue",
-    "ONOFF",
-    "ON 1",
-    "on,off",
-    "On",
-    "True",
-    "TRUE",
-    "truex",
-    "yes",
-    "{\"value\":9}}garbage",
-    "{\"value\":9}}",
-    "{\"value\":9} 9",
-    "{\"value\":9}{\"value\":9}",
-    "{\"value\":9",
-    "{\"value\":9,}",
-    "{,\"value\":9}",
-    "{\"value\":9 9}",
-    "{\"value\" 9}",
-    "{\"value\":}",
-    "{value:9}",
-    "{'value':9}",
-    "{\"Value\":9}",
-    "{\"values\":9}",
-    "{\"val\":9}",
-    "{\"value\":\"9\"}",
-    "{\"value\":null}",
-    "{\"value\":[9]}",
-    "{\"value\":{\"value\":9}}",
-    "{\"value\":0x9}",
-    "{\"value\":09}",
-    "{\"value\":+9}",
-    "{\"value\":9.}",
-    "{\"value\":9,5}",
-    "{\"value\":9x}",
-    "{\"value\":NaN}",
-    "{\"value\":ON}",
-    "{\"value\":9,\"value\":9}",
-    "{\"value\":9,\"value\":8}",
-    "{\"v\\u0061lue\":9}",
-    "{\"value\":9,\"v\\u0061lue\":8}",
-    "{\"a\":{\"value\":9}}",
-    "{\"a\":\"\\x\",\"value\":9}",
-    "{\"a\":\"\\u12g4\",\"value\":9}",
-    "{\"a\":\"\n\",\"value\":9}",
-    "{\"a\":truth,\"value\":9}",
-    "{\"a\":[1,],\"value\":9}",
-    "{\"a\":[1}],\"value\":9}",
-    "{\"a\":\"b,\"value\":9}",
-    "[{\"value\":9}]",
-    "{\"value\":9}\\",
-    "// 5",
-    "5 /* 5 */",
-};
+/* Every type refuses these; with a byte order mark, a space that does not break and a digit that is
+ * not of ASCII among them. */
+static const char NO_NUMBERS[] =
+    "21,5|0x10|12abc|5 6 7|1x|x1|+5|.5|5.|05|-|--1|- 1|1e|1e+|1.e5|1e5.0|1_000|1,000|1'000|0b1|"
+    "0o7|1f|1.0f|1L|NaN|nan|Inf|inf|-inf|Infinity|-Infinity|null|hot|\"5\"|[5]|[]|{}|5;|5\n6|"
+    "\357\273\2775|\302\2405|\xd9\xa5|1\v|\f1| |\n|truetrue|ONOFF|ON 1|on,off|On|True|TRUE|"
+    "truex|yes|{\"value\":9}}garbage|{\"value\":9}}|{\"value\":9} 9|{\"value\":9}{\"value\":9}|"
+    "{\"value\":9|{\"value\":9,}|{,\"value\":9}|{\"value\":9 9}|{\"value\" 9}|{\"value\":}|"
+    "{value:9}|{'value':9}|{\"Value\":9}|{\"values\":9}|{\"val\":9}|{\"value\":\"9\"}|"
+    "{\"value\":null}|{\"value\":[9]}|{\"value\":{\"value\":9}}|{\"value\":0x9}|{\"value\":09}|"
+    "{\"value\":+9}|{\"value\":9.}|{\"value\":9,5}|{\"value\":9x}|{\"value\":NaN}|"
+    "{\"value\":ON}|{\"value\":9,\"value\":9}|{\"value\":9,\"value\":8}|{\"v\\u0061lue\":9}|"
+    "{\"value\":9,\"v\\u0061lue\":8}|{\"a\":{\"value\":9}}|{\"a\":\"\\x\",\"value\":9}|"
+    "{\"a\":\"\\u12g4\",\"value\":9}|{\"a\":\"\n\",\"value\":9}|{\"a\":truth,\"value\":9}|"
+    "{\"a\":[1,],\"value\":9}|{\"a\":[1}],\"value\":9}|{\"a\":\"b,\"value\":9}|[{\"value\":9}]|"
+    "{\"value\":9}\\|// 5|5 /* 5 */";
 
 TEST(a_payload_that_is_no_number_as_a_whole_is_refused)
 {
-    for (unsigned i = 0; i < COUNT(NO_NUMBERS); i++)
-        for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
-            expect_refused(type, NULL, NO_NUMBERS[i], "no number");
+    EACH(payload, NO_NUMBERS)
+    for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_DOUBLE; type++)
+        expect_refused(type, NULL, payload, "no number");
 }
 
 TEST(bytes_after_a_zero_byte_are_not_overlooked)
@@ -204,27 +137,16 @@ TEST(a_payload_ends_where_its_length_says)
 
 TEST(json_may_have_space_and_other_members)
 {
-    static const char *const rows[] = {
-        "9",
-        " 9",
-        "9\n",
-        "\r\n9\t ",
-        "{\"value\":9}",
-        " { \"value\" : 9 } \n",
-        "{\"unit\":\"V\",\"value\":9}",
-        "{\"value\":9,\"status\":\"success\",\"time\":null}",
-        "{\"a\":{\"value\":1,\"b\":[1,-2.5e3,{}]},\"value\":9}",
-        "{\"a\":\"\\\"}\\u00e9\",\"value\":9}",
-        "{\"a\":[],\"b\":[[],\"\"],\"c\":true,\"d\":false,\"value\":9}",
-        "9.0",
-        "0.9e1",
-        "90e-1",
-        "9.000000000000000000000000000000000000",
-        "0.00000000000000000000000000000009e32",
-    };
+    static const char rows[] =
+        "9| 9|9\n|\r\n9\t |{\"value\":9}| { \"value\" : 9 } \n|{\"unit\":\"V\",\"value\":9}|"
+        "{\"value\":9,\"status\":\"success\",\"time\":null}|"
+        "{\"a\":{\"value\":1,\"b\":[1,-2.5e3,{}]},\"value\":9}|"
+        "{\"a\":\"\\\"}\\u00e9\",\"value\":9}|"
+        "{\"a\":[],\"b\":[[],\"\"],\"c\":true,\"d\":false,\"value\":9}|9.0|0.9e1|90e-1|"
+        "9.000000000000000000000000000000000000|0.00000000000000000000000000000009e32";
 
-    for (unsigned i = 0; i < COUNT(rows); i++)
-        expect(MBM_TYPE_UINT16, NULL, rows[i], 9);
+    EACH(payload, rows)
+    expect(MBM_TYPE_UINT16, NULL, payload, 9);
 }
 
 TEST(integers_of_64_bits_are_exact)
@@ -266,35 +188,20 @@ TEST(every_integer_of_a_type_is_taken_and_none_beyond)
         {MBM_TYPE_INT64, "-9223372036854775808", "-9223372036854775809", "9223372036854775807",
          "9223372036854775808"},
     };
-    static const char *const far[] = {
-
-        "1e20",
-        "1e38",
-        "1e39",
-        "1e308",
-        "1e309",
-
-        "1e99999",
-        "1e2147483648",
-        "1e9223372036854775808",
-        "1e18446744073709551616",
-        "1e99999999999999999999999999999999999",
-        "99999999999999999999999999999999999999999999999999999999999999999999999999",
-        "18446744073709551617",
-        "36893488147419103233",
-        "340282366920938463463374607431768211457",
-    };
-    unsigned i, k;
-
-    for (i = 0; i < COUNT(rows); i++) {
+    static const char far[] =
+        "1e20|1e38|1e39|1e308|1e309|1e99999|1e2147483648|1e9223372036854775808|"
+        "1e18446744073709551616|1e99999999999999999999999999999999999|"
+        "99999999999999999999999999999999999999999999999999999999999999999999999999|"
+        "18446744073709551617|36893488147419103233|340282366920938463463374607431768211457";
+    for (unsigned i = 0; i < COUNT(rows); i++) {
         const uint16_t count = parse(rows[i].type, NULL, rows[i].least);
 
         assert_int_equal(count, parse(rows[i].type, NULL, rows[i].most));
         assert_int_not_equal(count, 0);
         expect_refused(rows[i].type, NULL, rows[i].below, "out of range");
         expect_refused(rows[i].type, NULL, rows[i].above, "out of range");
-        for (k = 0; k < COUNT(far); k++)
-            expect_refused(rows[i].type, NULL, far[k], "out of range");
+        EACH(payload, far)
+        expect_refused(rows[i].type, NULL, payload, "out of range");
     }
     expect(MBM_TYPE_INT16, NULL, "-1", 0xFFFF);
     expect(MBM_TYPE_INT16, NULL, "-32768", 0x8000);
@@ -305,24 +212,14 @@ TEST(every_integer_of_a_type_is_taken_and_none_beyond)
 
 TEST(a_fraction_for_an_integer_is_refused_and_not_rounded)
 {
-    static const char *const rows[] = {
-        "0.5",
-        "1.5",
-        "-0.4",
-        "1.0000000000000000000000000000000000000000000000001",
-        "15e-1",
-        "0.99999999999999999999",
-        "1e-1",
-        "1e-99999",
-        "1e-99999999999999999999999999",
-        "{\"value\":1.5}",
-        "65535.5",
-        "18446744073709551615.5",
-    };
+    static const char rows[] =
+        "0.5|1.5|-0.4|1.0000000000000000000000000000000000000000000000001|15e-1|"
+        "0.99999999999999999999|1e-1|1e-99999|1e-99999999999999999999999999|{\"value\":1.5}|"
+        "65535.5|18446744073709551615.5";
 
-    for (unsigned i = 0; i < COUNT(rows); i++)
-        for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
-            expect_refused(type, NULL, rows[i], "not a whole number");
+    EACH(payload, rows)
+    for (uint8_t type = MBM_TYPE_BIT; type <= MBM_TYPE_INT64; type++)
+        expect_refused(type, NULL, payload, "not a whole number");
 }
 
 TEST(a_scaled_number_is_a_multiple_of_the_scale_in_decimal)
@@ -371,31 +268,14 @@ TEST(what_a_scaled_integer_is_published_as_can_be_written_back)
 
 TEST(a_scale_is_a_decimal_number)
 {
-    static const char *const bad[] = {
-        "",
-        "0",
-        "-0.0",
-        "0x1",
-        "0x1p-3",
-        "nan",
-        "inf",
-        "1e400",
-        "1e-400",
-        "1,5",
-        "1 ",
-        " 1",
-        "1x",
-        "+1",
-        ".1",
-        "1.",
-        "1234567890123456789",
-        "0.1234567890123456789",
-    };
+    static const char bad[] =
+        "|0|-0.0|0x1|0x1p-3|nan|inf|1e400|1e-400|1,5|1 | 1|1x|+1|.1|1.|1234567890123456789|"
+        "0.1234567890123456789";
     value_scale scale;
 
-    for (unsigned i = 0; i < COUNT(bad); i++)
-        if (value_scale_read(bad[i], &scale))
-            fail_msg("%s is taken", bad[i]);
+    EACH(text, bad)
+    if (value_scale_read(text, &scale))
+        fail_msg("%s is taken", text);
     assert_int_equal(value_scale_read("-12.50", &scale), 1);
     assert_int_equal(scale.digits, 125);
     assert_int_equal(scale.exponent, -1);
@@ -581,28 +461,13 @@ TEST(several_values_are_all_written)
 
 TEST(a_list_with_one_wrong_value_is_refused)
 {
-    static const char *const wrongs[] = {"",
-                                         "1",
-                                         "1,2",
-                                         "1,2,3,4",
-                                         "1,2,",
-                                         "1,,3",
-                                         ",1,2",
-                                         "[1,2,3",
-                                         "1,2,3]",
-                                         "[1,2,3],4",
-                                         "[[1,2,3]]",
-                                         "1 2 3",
-                                         "1;2;3",
-                                         "[1,2,3]x",
-                                         "{\"value\":1}",
-                                         "[]",
-                                         "{\"other\":[1,2,3]}",
-                                         "[{\"value\":1},2,3]"};
+    static const char wrongs[] =
+        "|1|1,2|1,2,3,4|1,2,|1,,3|,1,2|[1,2,3|1,2,3]|[1,2,3],4|[[1,2,3]]|1 2 3|1;2;3|[1,2,3]x|"
+        "{\"value\":1}|[]|{\"other\":[1,2,3]}|[{\"value\":1},2,3]";
 
-    for (unsigned i = 0; i < COUNT(wrongs); i++)
-        if (parse_all(MBM_TYPE_UINT16, 3, wrongs[i], strlen(wrongs[i])) != 0)
-            fail_msg("%s is taken", wrongs[i]);
+    EACH(payload, wrongs)
+    if (parse_all(MBM_TYPE_UINT16, 3, payload, strlen(payload)) != 0)
+        fail_msg("%s is taken", payload);
     expect_wrong(MBM_TYPE_UINT16, 3, "1,65536,3", "value 2: the number is out of range");
     expect_wrong(MBM_TYPE_UINT16, 3, "1,2", "no list of 3 values");
     expect_wrong(MBM_TYPE_BIT, 3, "1,0,2", "value 3");
