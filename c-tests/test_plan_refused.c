@@ -596,3 +596,24 @@ TEST_WITH(done_of_another_request_may_call_every_function, begin_hooked, NULL)
     IS(MBM_RESPONSE_TIMED_OUT, own.status);
     OK(mbm_plan_end(&d.plan));
 }
+
+/* In TCP frames unit 0 is a unit. */
+TEST(unit_0_is_read_over_tcp_and_refused_on_a_serial_line)
+{
+    uint16_t field = 77;
+
+    plan_device_begin(&d, 1);
+    plan_device_add(&d, 0, HOLDING, MBM_TYPE_UINT16, 5, 1000);
+    plan_device_add(&d, 1, HOLDING, MBM_TYPE_UINT16, 5, 1000);
+    plan_device_start(&d);
+    plan_device_run(&d, 500);
+    assert_int_equal(plan_device_requests(&d, 0), 1);
+    assert_int_equal(plan_device_integer(&d, 0, 0), d.registers[5]);
+    assert_int_equal(plan_device_integer(&d, 1, 0), d.registers[5]);
+
+    plan_device_begin(&d, 0);
+    plan_device_add(&d, 1, HOLDING, MBM_TYPE_UINT16, 5, 1000);
+    plan_device_add(&d, 0, HOLDING, MBM_TYPE_UINT16, 5, 1000);
+    IS(MBM_BROADCAST_NOT_ALLOWED, plan_device_try(&d, &field));
+    assert_int_equal(field, 1);
+}

@@ -391,6 +391,10 @@ TEST(settings_have_the_ranges_of_the_header)
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setTurnaroundDelay(&c, 65536));
     OK(mbm_client_setQuietTime(&c, 65535));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setQuietTime(&c, 65536));
+    OK(mbm_client_setMessageWait(&c, 65535));
+    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setMessageWait(&c, 65536));
+    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setAccept(&c, 4));
+    OK(mbm_client_setLenient(&c, 0));
     OK(mbm_client_setBusyRetries(&c, 255, 65535));
     REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBusyRetries(&c, 1, 65536));
     OK(mbm_client_setBackoff(&c, MBM_BACKOFF_EXPONENTIAL, 1000000, 1000000));
@@ -504,6 +508,10 @@ TEST(a_link_has_the_limits_of_the_header)
     OK(mbm_link_setConnectTimeout(&link, 0));
     OK(mbm_link_setConnectTimeout(&link, 1000000));
     REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setConnectTimeout(&link, 1000001));
+    OK(mbm_link_setDelayAfterConnect(&link, 0));
+    OK(mbm_link_setDelayAfterConnect(&link, 65535));
+    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setDelayAfterConnect(&link, 65536));
+    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setClose(&link, 4));
     OK(mbm_link_setReplaceAfter(&link, 0));
     OK(mbm_link_setReplaceAfter(&link, 100));
     REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setReplaceAfter(&link, 101));

@@ -228,6 +228,15 @@ public:
         return mbm_client_setBusyRetries(&client, retries, waitMs);
     }
     /**
+     * On Modbus TCP, the replies that are accepted with another unit or transaction identifier:
+     * MBM_ACCEPT_UNIT, MBM_ACCEPT_TRANSACTION, both or 0 (at first). See mbm_client_setAccept.
+     */
+    uint8_t setAccept(uint8_t accept) { return mbm_client_setAccept(&client, accept); }
+    /** Accepts replies that deviate from the standard; off at first. See mbm_client_setLenient. */
+    uint8_t setLenient(bool on) { return mbm_client_setLenient(&client, on); }
+    /** The least time from the end of a request to the next one, 0 to 65535 ms; 0 at first. */
+    uint8_t setMessageWait(uint32_t waitMs) { return mbm_client_setMessageWait(&client, waitMs); }
+    /**
      * Milliseconds before a repetition: MBM_BACKOFF_NONE (at first), _FIXED, _LINEAR or
      * _EXPONENTIAL, the first wait and the longest. Other requests are sent meanwhile.
      */

@@ -32,7 +32,7 @@ fn send_times<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 4>) ->
 
 fn policy(backoff: Backoff, wait: u32, retries: u8) -> Policy {
     let mut policy = Policy::DEFAULT;
-    policy.set_backoff(backoff, wait, 1_000_000.max(wait));
+    policy.waits.set_backoff(backoff, wait, 1_000_000.max(wait));
     policy.retries = retries;
     policy
 }
@@ -95,7 +95,7 @@ fn jitter_shortens_the_backoff() {
     };
     let (end, mut client) = tcp(lent);
     *client.policy() = policy(Backoff::Fixed, 300_000, 4);
-    client.policy().jitter = 128;
+    client.policy().waits.jitter = 128;
     assert!(client.queue(read(1)).is_ok());
     let (send_times, _) = send_times(&end, &mut client);
     assert_eq!(pauses(&send_times), [225_000; 4]);

@@ -166,6 +166,7 @@ fn late_bytes_are_read<L: Transport<Task>>(end: &End, client: &mut Client<L, Tas
     client.policy().retries = 1;
     client
         .policy()
+        .waits
         .set_backoff(Backoff::Fixed, TIMEOUT, TIMEOUT);
     assert!(client.queue(read(1)).is_ok());
     for _ in 0..5 {

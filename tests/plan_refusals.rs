@@ -129,7 +129,7 @@ fn storage_that_does_not_suffice_is_refused_with_the_first_field_left_over() {
     let run = |positions: usize, reads: usize, words| {
         let mut positions = vec![Position::NONE; positions];
         let mut reads = vec![Read::default(); reads];
-        group(&fields, &LIMITS, &mut positions, &mut reads, words)
+        group(&fields, 0, &LIMITS, &mut positions, &mut reads, words)
     };
     let small = |field| {
         Err(Refusal {
@@ -168,7 +168,7 @@ fn too_many_grouped_fields_are_refused_as_too_many_fields_are() {
 fn taken(fields: &[Field], counts: &[u16], reads: usize, words: u16) -> Result<usize, Refusal> {
     let mut positions = vec![Position::NONE; fields.len()];
     let mut reads = vec![Read::default(); reads];
-    take_groups(fields, counts, &mut positions, &mut reads, words)
+    take_groups(fields, 0, counts, &mut positions, &mut reads, words)
 }
 
 #[test]

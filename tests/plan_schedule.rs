@@ -163,7 +163,7 @@ impl Pair {
             .collect();
         let mut positions = vec![Position::NONE; fields.len()];
         let mut reads = vec![Read::default(); fields.len()];
-        let count = group(&fields, &LIMITS, &mut positions, &mut reads, u16::MAX);
+        let count = group(&fields, 0, &LIMITS, &mut positions, &mut reads, u16::MAX);
         assert_eq!(count, Ok(fields.len()));
         let schedule = Schedule::default();
         schedule.start(&reads, now);

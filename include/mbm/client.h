@@ -33,6 +33,11 @@ struct mbm_line;
 /** mbm_client_setBackoff: the client waits `delayMs` before the first repetition, twice that
  *  before the second, four times that before the third, but at most `maxDelayMs`. */
 #define MBM_BACKOFF_EXPONENTIAL 3u
+/** mbm_client_setAccept: a response of another unit than that of its request is accepted. */
+#define MBM_ACCEPT_UNIT 1u
+/** mbm_client_setAccept: a response with another transaction identifier than that of its
+ *  request is accepted. */
+#define MBM_ACCEPT_TRANSACTION 2u
 
 /**
  * A client of one serial line or one TCP stream. It queues up to 16 requests.
@@ -268,7 +273,8 @@ uint8_t mbm_client_setDelimiter(mbm_client *client, uint8_t character);
  * one at a time: they drop a request that arrives before they have answered the last one, or
  * in one segment with another. The queue always holds 16.
  *
- * @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
+ * @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted, as
+ *              with mbm_client_setMessageWait and MBM_ACCEPT_TRANSACTION
  */
 uint8_t mbm_client_setInFlight(mbm_client *client, uint8_t most);
 
@@ -819,6 +825,51 @@ uint8_t mbm_client_setPostFlushHold(mbm_client *client, uint8_t characters);
  * @param counters  your counters, initialised with MBM_INIT; NULL stops counting
  */
 uint8_t mbm_client_setCounters(mbm_client *client, mbm_counters *counters);
+
+/**
+ * Sets which responses in TCP frames the client accepts although their header is not that of
+ * the request: some devices answer with unit 0, 1 or 255 whatever unit was asked, some with
+ * transaction identifier 0 or a count of their own. All else of the response must be right.
+ *
+ * With MBM_ACCEPT_TRANSACTION nothing tells a late response from the right one. So only one
+ * request may be in flight, and after a request without an answer the client sends no other
+ * one until the late response has come, or two response timeouts and the quiet time
+ * (mbm_client_setQuietTime) after that request. Over a new connection the next one is sent at
+ * once: mbm_link_setClose with MBM_LINK_CLOSE_AFTER_FAILURE makes one, after which no late
+ * response comes, however late it is.
+ *
+ * @param accept  MBM_ACCEPT_UNIT, MBM_ACCEPT_TRANSACTION, both or 0 (the default)
+ * @return a status; MBM_INVALID_ARGUMENT also for a client without TCP frames, and for
+ *         MBM_ACCEPT_TRANSACTION if mbm_client_setInFlight allows more than one request
+ */
+uint8_t mbm_client_setAccept(mbm_client *client, uint8_t accept);
+
+/**
+ * Sets whether the client accepts responses that deviate from the standard: to a read with
+ * more data than requested, of which the first count, and to a write with another address,
+ * value or quantity than requested. (Some meters send four bytes for one register.) The frame
+ * buffer must hold the response. A response with less data than requested stays
+ * MBM_MALFORMED_REPLY.
+ *
+ * On an RTU line such a reply ends the request once the line is silent, so that a right one
+ * after it wins.
+ *
+ * @param on  0 (the default) or 1
+ * @return a status; MBM_INVALID_ARGUMENT for 1 on a line with ASCII frames
+ */
+uint8_t mbm_client_setLenient(mbm_client *client, uint8_t on);
+
+/**
+ * Sets the least time from the end of a request to the next one, for devices that need a
+ * pause. On a serial line and in RTU over TCP this is the gap, unless t3.5 is longer: a later
+ * call of mbm_client_setBaudRate or mbm_client_setGap replaces it. In TCP frames only one
+ * request may be in flight.
+ *
+ * @param waitMs  milliseconds, 0 (the default) to 65535
+ * @return a status; MBM_INVALID_ARGUMENT also if mbm_client_setInFlight allows more than one
+ *         request
+ */
+uint8_t mbm_client_setMessageWait(mbm_client *client, uint32_t waitMs);
 
 /**
  * Sets the records of units. In a record the client counts the requests to its unit. The

@@ -32,6 +32,12 @@ extern "C" {
 /** An event of a link: an attempt to open it failed. The status is the result of `connect` or
  *  `status` of mbm_linkHooks; MBM_CONNECT_TIMED_OUT if the connection took too long. */
 #define MBM_LINK_EVENT_FAILED 2u
+/** mbm_link_setClose: the link stays open. */
+#define MBM_LINK_CLOSE_NEVER 0u
+/** mbm_link_setClose: the link is closed when mbm_client_poll finds no request. */
+#define MBM_LINK_CLOSE_WHEN_IDLE 1u
+/** mbm_link_setClose: the link is closed after a request without a right response. */
+#define MBM_LINK_CLOSE_AFTER_FAILURE 2u
 
 /**
  * A link that opens itself again when it was lost. It belongs to one client:
@@ -204,6 +210,32 @@ uint8_t mbm_link_setCounters(mbm_link *link, mbm_linkCounters *counters);
  *         for an object that was never begun
  */
 uint8_t mbm_link_state(const mbm_link *link);
+
+/**
+ * Sets when the link is closed although it is good. A request opens it again, without a wait,
+ * and waits for that. Such a close is no loss: the link counts none and reports none.
+ *
+ * MBM_LINK_CLOSE_WHEN_IDLE is for devices with few places for connections. A program that
+ * queues the requests of a round before it polls, as mbm_plan_poll does, closes the link after
+ * each round.
+ *
+ * MBM_LINK_CLOSE_AFTER_FAILURE is for devices that answer no more, or wrongly, until they are
+ * connected to anew: after a request, or its repetition, whose response is missing, damaged or
+ * malformed. An exception is a right response. Over the new connection no late response comes.
+ * Other requests in flight end with MBM_LINK_LOST, those that wait are sent over it.
+ *
+ * @param when  MBM_LINK_CLOSE_NEVER (the default), MBM_LINK_CLOSE_WHEN_IDLE,
+ *              MBM_LINK_CLOSE_AFTER_FAILURE, or the last two added
+ */
+uint8_t mbm_link_setClose(mbm_link *link, uint8_t when);
+
+/**
+ * Sets how long no request is sent after the link was opened, for devices that answer nothing
+ * at first. Requests wait meanwhile; their response timeout begins when they are sent.
+ *
+ * @param delayMs  milliseconds, 0 (the default) to 65535
+ */
+uint8_t mbm_link_setDelayAfterConnect(mbm_link *link, uint32_t delayMs);
 
 #ifdef __cplusplus
 }  // extern "C"

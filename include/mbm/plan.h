@@ -85,7 +85,7 @@ typedef struct mbm_plan {
  * unit again and again. A table of them may be constant.
  */
 typedef struct mbm_planField {
-    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
+    /** The unit, 1 to 255; in TCP frames also 0. mbm_plan_begin refuses any other number. */
     uint16_t unit;
     /** One of MBM_TABLE_... */
     uint8_t table;
@@ -128,7 +128,7 @@ typedef struct mbm_planUnitLimits {
     uint16_t bitsPerRead;
     /** Registers, 1 to 125; 0 means as `registersPerRead` of the plan. */
     uint16_t registersPerRead;
-    /** The unit, 1 to 255. mbm_plan_begin refuses a greater number. */
+    /** The unit, 0 to 255. mbm_plan_begin refuses a greater number. */
     uint16_t unit;
 } mbm_planUnitLimits;
 
@@ -263,7 +263,8 @@ typedef struct mbm_planReadInfo {
  * @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or order,
  *         a type that the table does not have, bits beyond those of a register, a unit above 255,
  *         an interval out of range, a negative divisor or a scale of a text;
- *         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
+ *         MBM_BROADCAST_NOT_ALLOWED for unit 0, unless the client has TCP frames;
+ *         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
  *         65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a read may
  *         be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data. After
  *         such a status the plan has ended, and `positions` and `reads` may be changed.

@@ -1,6 +1,6 @@
 //! Keeps a link open: decides when to open it again after it was lost.
 
-use super::policy::{Backoff, Policy};
+use super::policy::{Backoff, Waits};
 use crate::error::Status;
 use crate::time::{elapsed, has_elapsed, millis, Micros};
 
@@ -101,7 +101,7 @@ pub struct Link {
     /// [`MOST_FRUITLESS`].
     fruitless: u8,
     /// The wait before an attempt, its growth and jitter.
-    pub policy: Policy,
+    pub waits: Waits,
     /// How long a connection may take to be made, in microseconds; 0 for no limit.
     pub connect_timeout: Micros,
     /// The time at which the state began, and how long it lasts.
@@ -116,7 +116,7 @@ impl Link {
     /// 30 seconds; 10 seconds for a connection.
     pub fn begin(&mut self) {
         self.state = LinkState::Unknown;
-        self.policy
+        self.waits
             .set_backoff(Backoff::Exponential, millis(500), millis(30_000));
         self.connect_timeout = millis(10_000);
     }
@@ -198,6 +198,25 @@ impl Link {
         }
     }
 
+    /// Closes the link, if it is open, until a request opens it again without a wait.
+    pub fn close(&mut self, now: u32) {
+        if !self.is_up() {
+            return;
+        }
+        self.state = LinkState::Down;
+        self.is_to_close = true;
+        self.attempts = 0;
+        self.reopens = true;
+        self.rests = true;
+        self.since = now;
+        self.wait = 0;
+    }
+
+    /// Microseconds since the link was opened.
+    pub fn age(&self, now: u32) -> u32 {
+        elapsed(now, self.since)
+    }
+
     /// Takes the step that is due at the time `now`, and returns the event, with its status. An
     /// attempt is made only if `fresh`, so at most once in each poll. `is_wanted` says that a
     /// request waits.
@@ -270,7 +289,7 @@ impl Link {
                 self.since = now;
                 self.heard = now;
                 // The time for which the link must be open before the waits start anew.
-                self.wait = self.policy.wait(self.attempts.max(1), || 0);
+                self.wait = self.waits.wait(self.attempts.max(1), || 0);
                 Some((LinkEvent::Connected, status))
             }
             Status::PENDING => {
@@ -306,7 +325,7 @@ impl Link {
         self.wait = 0;
         if !self.at_once {
             self.attempts = self.attempts.saturating_add(1);
-            self.wait = self.policy.wait(self.attempts, || hooks.random());
+            self.wait = self.waits.wait(self.attempts, || hooks.random());
         }
         Some((event, status))
     }

@@ -5,6 +5,7 @@
 //! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
 //! between a request and a frame buffer.
 
+mod lenient;
 mod link;
 mod policy;
 mod queue;
@@ -19,7 +20,7 @@ mod units;
 pub use link::{Link, LinkEvent, LinkHooks, LinkState, MOST_REPLACE_AFTER};
 #[doc(hidden)]
 pub use policy::{again, again_when_busy};
-pub use policy::{Backoff, Policy, NO_RETRIES};
+pub use policy::{Backoff, Policy, Waits, NO_RETRIES};
 pub use queue::RequestQueue;
 pub use ready::Request;
 pub use request::{ClientRequest, Refused, RequestState};
@@ -27,7 +28,7 @@ pub use request::{ClientRequest, Refused, RequestState};
 pub use serial::late_rest;
 pub use serial::Serial;
 pub use storage::{ClientStorage, TcpBuffers};
-pub use tcp::Tcp;
+pub use tcp::{Tcp, TolerantTcp, ACCEPT_TRANSACTION, ACCEPT_UNIT};
 #[doc(hidden)]
 pub use transaction::{ClientEngine, ClientTransaction};
 pub use units::UnitRecord;

@@ -5,7 +5,7 @@ use crate::error::Status;
 use crate::time::{millis, Micros};
 
 /// How the wait before a retry grows from one retry to the next. `wait` and `most` are
-/// the arguments of [`Policy::set_backoff`].
+/// the arguments of [`Waits::set_backoff`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Backoff {
@@ -32,15 +32,14 @@ impl Backoff {
     }
 }
 
-/// Computes the wait before a retry. The arguments are the policy, the number of the
+/// Computes the wait before a retry. The arguments are the waits, the number of the
 /// retry (from 1 on), and a random number for the jitter.
-type Grow = fn(&Policy, u8, u32) -> u32;
+type Grow = fn(&Waits, u8, u32) -> u32;
 
-/// How many retries a request gets, and how long the client waits before each. Times are
-/// in microseconds.
+/// How long to wait before each retry. Times are in microseconds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct Policy {
+pub struct Waits {
     /// The wait before the first retry.
     wait: Micros,
     /// The longest wait.
@@ -52,6 +51,14 @@ pub struct Policy {
     backoff: Backoff,
     /// Up to this part of the wait, in 256ths, is subtracted at random.
     pub jitter: u8,
+}
+
+/// How many retries a request gets, and how long the client waits before each.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Policy {
+    /// The wait before each retry after a failure.
+    pub waits: Waits,
     /// Greatest number of retries of one request, 0 to 255.
     pub retries: u8,
     /// Greatest number of retries of one request that a busy device refuses, 0 to 255.
@@ -63,19 +70,23 @@ pub struct Policy {
 impl Policy {
     /// No retries.
     pub const DEFAULT: Policy = Policy {
-        wait: 0,
-        max_wait: 0,
-        grow: None,
-        backoff: Backoff::None,
-        jitter: 0,
+        waits: Waits {
+            wait: 0,
+            max_wait: 0,
+            grow: None,
+            backoff: Backoff::None,
+            jitter: 0,
+        },
         retries: 0,
         busy_retries: 0,
         busy_wait_ms: 0,
     };
+}
 
+impl Waits {
     /// Sets the wait before the first retry, how it grows, and the longest wait `most`.
     pub fn set_backoff(&mut self, backoff: Backoff, wait: u32, most: u32) {
-        self.grow = Some(Policy::grown_wait);
+        self.grow = Some(Waits::grown_wait);
         self.backoff = backoff;
         self.wait = wait;
         self.max_wait = most;
@@ -156,7 +167,7 @@ pub fn again(
     if retries >= limit || !status.may_be_repeated() {
         return None;
     }
-    Some(policy.wait(retries + 1, random))
+    Some(policy.waits.wait(retries + 1, random))
 }
 
 /// Microseconds to wait before the next retry of a request that ended with `status`, the
@@ -178,8 +189,8 @@ mod tests {
 
     fn waits(backoff: Backoff) -> [u32; 5] {
         let mut policy = Policy::DEFAULT;
-        policy.set_backoff(backoff, 1000, 3500);
-        [1, 2, 3, 4, 255].map(|retry| policy.wait(retry, || 0))
+        policy.waits.set_backoff(backoff, 1000, 3500);
+        [1, 2, 3, 4, 255].map(|retry| policy.waits.wait(retry, || 0))
     }
 
     #[test]
@@ -194,11 +205,13 @@ mod tests {
     /// fall into each part, in per mille.
     fn tenths(numbers: impl Iterator<Item = u32>) -> [u32; 10] {
         let mut policy = Policy::DEFAULT;
-        policy.set_backoff(Backoff::Fixed, 1_000_000, 1_000_000);
-        policy.jitter = 128;
+        policy
+            .waits
+            .set_backoff(Backoff::Fixed, 1_000_000, 1_000_000);
+        policy.waits.jitter = 128;
         let (mut counts, mut all) = ([0; 10], 0);
         for number in numbers {
-            let off = 1_000_000 - policy.wait(1, || number);
+            let off = 1_000_000 - policy.waits.wait(1, || number);
             counts[(off / 50_000) as usize] += 1000;
             all += 1;
         }
@@ -215,11 +228,13 @@ mod tests {
     #[test]
     fn jitter_subtracts_at_most_its_part() {
         let mut policy = Policy::DEFAULT;
-        policy.set_backoff(Backoff::Fixed, 1000, 1000);
-        policy.jitter = 77;
-        assert_eq!(policy.wait(1, || 0), 1000);
-        assert_eq!(policy.wait(1, || 1 << 31), 850);
-        let least = (0..0x8000).map(|number| policy.wait(1, || number)).min();
+        policy.waits.set_backoff(Backoff::Fixed, 1000, 1000);
+        policy.waits.jitter = 77;
+        assert_eq!(policy.waits.wait(1, || 0), 1000);
+        assert_eq!(policy.waits.wait(1, || 1 << 31), 850);
+        let least = (0..0x8000)
+            .map(|number| policy.waits.wait(1, || number))
+            .min();
         assert_eq!(least, Some(701));
     }
 

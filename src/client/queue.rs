@@ -214,6 +214,12 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
         self.mark_lost(|request| request.state().is_sent());
     }
 
+    /// How often all pending requests together were repeated.
+    pub fn retries(&self) -> u32 {
+        let pending = self.active.iter().chain(&self.queue);
+        pending.map(|one| u32::from(one.state().retries)).sum()
+    }
+
     /// True if no request is in flight.
     pub fn is_idle(&self) -> bool {
         self.active.is_none() && !self.queue.iter().any(|request| request.state().is_sent())
@@ -273,7 +279,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     }
 
     /// Records that no request is due until `wait` microseconds after `now`.
-    pub(super) fn set_next_due(&mut self, now: u32, wait: u32) {
+    pub fn set_next_due(&mut self, now: u32, wait: u32) {
         self.changed = false;
         self.since = now;
         self.wait = wait;
@@ -333,8 +339,12 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
 
     /// Ends a request that [`RequestQueue::fail_all`] or [`RequestQueue::interrupt`] marked as
     /// lost; `None` if there is none.
+    #[inline(always)]
     pub fn end_lost(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
-        let at = self.queue.iter().position(is_lost)?;
+        let mut at = 0;
+        while !is_lost(self.queue.get(at)?) {
+            at += 1;
+        }
         self.end(at, Status::LINK_LOST, now, storage)
     }
 

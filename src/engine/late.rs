@@ -200,7 +200,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Decides on the response in `seen`. True if it answers the request. If it may be a late one,
     /// it is held. It replaces a response that was held before.
-    pub(super) fn take_response(&mut self) -> bool {
+    pub(crate) fn take_response(&mut self) -> bool {
         if self.is_held {
             self.note_foreign_frame();
         }

@@ -22,6 +22,11 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.phase != Phase::Idle && self.phase < Phase::Send
     }
 
+    /// True if the request was sent and its reply has not come.
+    pub(crate) fn awaits_reply(&self) -> bool {
+        self.phase == Phase::Reply
+    }
+
     /// How many bytes the frame buffer holds.
     pub(crate) fn end(&self) -> S::Count {
         self.end

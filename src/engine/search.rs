@@ -209,7 +209,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The next byte begins a frame.
-    pub(super) fn begin_frame(&mut self) {
+    pub(crate) fn begin_frame(&mut self) {
         self.run_length = S::Count::ZERO;
         self.run = Crc16::START;
     }

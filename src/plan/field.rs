@@ -41,7 +41,7 @@ pub const LONGEST_INTERVAL_MS: u32 = 86_400_000;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// The unit, 1 to 255.
+    /// The unit, 1 to 255; in TCP frames also 0.
     pub unit: u16,
     /// [`COILS`] to [`INPUT_REGISTERS`].
     pub table: u8,
@@ -83,10 +83,9 @@ impl Field {
     /// Checks the field by itself: [`Status::OK`]; [`Status::INVALID_ARGUMENT`] for an unknown
     /// table, type or order, a type that the table does not have, bits beyond those of a register,
     /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text or of
-    /// [`REGISTERS`];
-    /// [`Status::BROADCAST_NOT_ALLOWED`] for unit 0; [`Status::ILLEGAL_DATA_ADDRESS`] if the
-    /// field goes beyond address 65535.
-    pub fn check(&self) -> Status {
+    /// [`REGISTERS`]; [`Status::BROADCAST_NOT_ALLOWED`] for unit 0, unless `has_unit_0` is 1, as it is
+    /// in TCP frames; [`Status::ILLEGAL_DATA_ADDRESS`] if the field goes beyond address 65535.
+    pub fn check(&self, has_unit_0: u16) -> Status {
         let known = self.table.wrapping_sub(1) < INPUT_REGISTERS
             && self.value_type.wrapping_sub(1) < REGISTERS
             && (self.value_type == BIT || !self.is_in_bits())
@@ -98,7 +97,7 @@ impl Field {
             && self.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
         if !known {
             Status::INVALID_ARGUMENT
-        } else if self.unit == 0 {
+        } else if self.unit | has_unit_0 == 0 {
             Status::BROADCAST_NOT_ALLOWED
         } else if self.end() > 0x1_0000 {
             Status::ILLEGAL_DATA_ADDRESS

@@ -18,7 +18,8 @@ pub struct Refusal {
 pub const MAX_FIELDS: usize = 16_383;
 
 /// Groups `fields` into `reads`, with their data in `words` words. Fields are in one read only
-/// if they have the same unit, table and interval; they may overlap. Returns the number of reads.
+/// if they have the same unit, table and interval; they may overlap. `has_unit_0` is 1 in TCP frames,
+/// in which unit 0 is a unit, and otherwise 0. Returns the number of reads.
 ///
 /// The result covers all fields within the limits by the fewest reads, and among such results
 /// by the fewest bits and registers. The time that it takes grows with n log n.
@@ -30,6 +31,7 @@ pub const MAX_FIELDS: usize = 16_383;
 /// excluded range whose last address is less than its first.
 pub fn group<L: ReadLimits>(
     fields: &[Field],
+    has_unit_0: u16,
     limits: &L,
     positions: &mut [Position],
     reads: &mut [Read],
@@ -49,7 +51,7 @@ pub fn group<L: ReadLimits>(
         limits,
     };
     for (index, field) in fields.iter().enumerate() {
-        let status = limits.check(field);
+        let status = limits.check(field, has_unit_0);
         if status != Status::OK {
             return refused(status, index);
         }
@@ -76,6 +78,7 @@ pub fn group<L: ReadLimits>(
 /// [`Status::BUFFER_TOO_SMALL`] without a field at fault for fewer `reads` than counts.
 pub fn take_groups(
     fields: &[Field],
+    has_unit_0: u16,
     counts: &[u16],
     positions: &mut [Position],
     reads: &mut [Read],
@@ -98,7 +101,7 @@ pub fn take_groups(
         };
         let mut quantity = 0;
         for (place, (field, position)) in (start..).zip(own.iter().zip(places)) {
-            let status = field.check();
+            let status = field.check(has_unit_0);
             if status != Status::OK {
                 return refused(status, place);
             }

@@ -32,7 +32,7 @@ pub fn field(address: u16) -> Field {
 pub fn grouped(fields: &[Field], limits: &Limits) -> Result<Vec<Read>, Refusal> {
     let mut positions = vec![Position::NONE; fields.len()];
     let mut reads = vec![Read::default(); fields.len()];
-    let count = group(fields, limits, &mut positions, &mut reads, u16::MAX)?;
+    let count = group(fields, 0, limits, &mut positions, &mut reads, u16::MAX)?;
     reads.truncate(count);
     check_positions(fields, &positions, &reads);
     check_groups(fields, &positions, &reads);
@@ -50,7 +50,7 @@ fn check_groups(fields: &[Field], positions: &[Position], reads: &[Read]) {
     let mut taken_positions = vec![Position::NONE; fields.len()];
     let mut taken = vec![Read::default(); reads.len()];
     let (positions, words) = (&mut taken_positions[..], u16::MAX);
-    let count = take_groups(&sorted, &counts, positions, &mut taken, words);
+    let count = take_groups(&sorted, 0, &counts, positions, &mut taken, words);
     assert_eq!(count, Ok(reads.len()));
     assert_eq!(taken, reads);
     check_positions(&sorted, &taken_positions, &taken);

@@ -190,13 +190,16 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 /// one at a time: they drop a request that arrives before they have answered the last one, or
 /// in one segment with another. The queue always holds 16.
 ///
-/// @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted
+/// @param most  1 (the default) to 16. On a serial line and in RTU over TCP only 1 is accepted, as
+///              with mbm_client_setMessageWait and MBM_ACCEPT_TRANSACTION
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     pointers::with(client, |object| match ((*(*object).kind).framing, most) {
         (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-            transport::<TcpTransport>(object).set_in_flight(most);
-            Status::OK
+            match transport::<TcpTransport>(object).set_in_flight(most) {
+                true => Status::OK,
+                false => Status::INVALID_ARGUMENT,
+            }
         }
         (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
         _ => Status::INVALID_ARGUMENT,

@@ -1,7 +1,8 @@
 //! The kinds of transport of the client, as tables. Only the mbm_client_begin functions use
 //! the tables, so firmware contains the code of the kinds that it begins, and of no others.
 
-use super::object::{transport, Object, SerialTransport, TcpTransport, TransportKind};
+use super::object::{transport, Object, SerialTransport, TcpTransport};
+use super::object::{TolerantTransport, TransportKind};
 use super::request::RequestPtr;
 use super::storage::ClientBuffers;
 use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
@@ -54,6 +55,13 @@ pub(super) static TCP: TransportKind = TransportKind {
     min_frame_bytes: 9,
     framing: MBM_FRAMING_TCP,
 };
+/// A stream that is [`TCP`] until a setting makes it tolerant.
+pub(super) static TOLERANT: TransportKind = TransportKind {
+    advance: advance::<TolerantTransport>,
+    release: release::<TolerantTransport>,
+    ..TCP
+};
+const _: () = assert!(offset_of!(TolerantTransport, tcp) == 0);
 
 /// # Safety
 /// As for [`transport`].

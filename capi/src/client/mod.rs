@@ -12,6 +12,7 @@ pub(crate) mod request;
 mod requests;
 mod settings;
 mod storage;
+mod tolerance;
 mod units;
 
 pub(crate) use begin::has_tcp_frames;
@@ -28,6 +29,7 @@ pub use request::mbm_clientRequest;
 pub(crate) use requests::read_table;
 pub use requests::*;
 pub use settings::*;
+pub use tolerance::*;
 pub use units::*;
 
 /// The maximum number of requests that are pending in one client.

@@ -8,7 +8,7 @@ use crate::pointers::c_object;
 use crate::port::mbm_port;
 use core::ffi::c_void;
 use core::mem::ManuallyDrop;
-use mbm::client::{RequestQueue, Serial, Tcp};
+use mbm::client::{RequestQueue, Serial, Tcp, TolerantTcp};
 use mbm::engine::Settings;
 
 pub(super) const DEPTH: usize = MBM_CLIENT_DEPTH as usize;
@@ -58,12 +58,15 @@ pub(crate) unsafe fn queue<'a>(object: *mut Object) -> &'a mut RequestQueue<Requ
 
 pub(super) type SerialTransport = Serial<mbm_port, ClientBuffers, RequestPtr>;
 pub(super) type TcpTransport = Tcp<mbm_port, ClientBuffers>;
+/// It begins as a [`TcpTransport`].
+pub(super) type TolerantTransport = TolerantTcp<mbm_port, ClientBuffers>;
 
 /// Storage of a transport of any kind.
 #[repr(C)]
 pub(super) union Transports {
     serial: ManuallyDrop<SerialTransport>,
     tcp: ManuallyDrop<TcpTransport>,
+    tolerant: ManuallyDrop<TolerantTransport>,
 }
 
 /// As [`Transport::advance`].
@@ -97,6 +100,8 @@ pub(crate) struct LinkedKind {
     pub(crate) delay: unsafe fn(*mut Object, now: u32, delay: u32) -> u32,
     /// The client; NULL once it was begun again, because the link may then outlive it.
     pub(crate) client: *mut mbm_client,
+    /// The client's transport, as if it had no link.
+    pub(crate) transport: *const TransportKind,
 }
 
 impl TransportKind {

@@ -5,7 +5,7 @@ use super::settings::{set, Parts};
 use super::storage::ClientBuffers;
 use core::ffi::c_void;
 use mbm::client::{
-    again, again_when_busy, Backoff, ClientStorage as _, Policy, RequestState, NO_RETRIES,
+    again, again_when_busy, Backoff, ClientStorage as _, Policy, RequestState, Waits, NO_RETRIES,
 };
 use mbm::error::Status;
 use mbm::time::timeout;
@@ -120,19 +120,19 @@ pub unsafe extern "C" fn mbm_client_setBackoff(
     maxDelayMs: u32,
 ) -> u8 {
     set(client, |parts| {
-        set_backoff(&mut parts.queue.policy, backoff, delayMs, maxDelayMs)
+        set_backoff(&mut parts.queue.policy.waits, backoff, delayMs, maxDelayMs)
     })
 }
 
-/// Sets the waits of `policy`, with the arguments of [`mbm_client_setBackoff`].
-pub(crate) fn set_backoff(policy: &mut Policy, backoff: u8, delay_ms: u32, most_ms: u32) -> Status {
+/// Sets `waits`, with the arguments of [`mbm_client_setBackoff`].
+pub(crate) fn set_backoff(waits: &mut Waits, backoff: u8, delay_ms: u32, most_ms: u32) -> Status {
     let Some(backoff) = Backoff::from_code(backoff) else {
         return Status::INVALID_ARGUMENT;
     };
     let (Some(wait), Some(most)) = (timeout(delay_ms), timeout(most_ms)) else {
         return Status::INVALID_ARGUMENT;
     };
-    policy.set_backoff(backoff, wait, most);
+    waits.set_backoff(backoff, wait, most);
     Status::OK
 }
 
@@ -153,7 +153,12 @@ pub unsafe extern "C" fn mbm_client_setJitter(
     context: *mut c_void,
 ) -> u8 {
     set(client, |parts| {
-        if !parts.queue.policy.set_jitter(percent, random.is_some()) {
+        if !parts
+            .queue
+            .policy
+            .waits
+            .set_jitter(percent, random.is_some())
+        {
             return Status::INVALID_ARGUMENT;
         }
         parts.storage.random = random;

@@ -1,11 +1,13 @@
 //! `mbm_link_*`: keeps the link of a client open.
 
 mod object;
+mod pace;
 mod port;
 
 pub use object::{mbm_link, mbm_linkCounters};
+pub use pace::*;
 
-use crate::client::object::{self as client, LinkedKind, TransportKind};
+use crate::client::object::{self as client, TransportKind};
 use crate::client::{mbm_client, mbm_linkHooks, set_backoff};
 use crate::pointers::{self, change, with, CObject as _};
 use core::ffi::c_void;
@@ -117,7 +119,7 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
     // Zero is a valid value of every field but those that are set here.
     pointers::zero(link);
     let transport = (*target).kind;
-    (*object).transport = transport;
+    (*object).kind.transport = transport;
     (*object).hooks = *hooks;
     (*object).port.copy(&*(*transport).port(target));
     (*object).request.done = Some(report);
@@ -128,24 +130,18 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
     }
     let port = port::port(object);
     (*(*transport).port(target)).copy(&port);
-    (&raw mut (*object).kind).write(linked(&*transport, client));
+    let kind = &raw mut (*object).kind;
+    (*kind).kind = TransportKind {
+        advance: object::advance,
+        release: object::release,
+        ..*transport
+    };
+    (*kind).delay = object::delay;
+    (*kind).client = client;
     (*target).kind = (&raw const (*object).kind).cast();
     (*target).linked = true;
     mbm_link::mark(link).write(pointers::BEGUN);
     Status::OK
-}
-
-/// The functions and numbers of `client`, which gets a link and whose transport is `transport`.
-fn linked(transport: &TransportKind, client: *mut mbm_client) -> LinkedKind {
-    LinkedKind {
-        kind: TransportKind {
-            advance: object::advance,
-            release: object::release,
-            ..*transport
-        },
-        delay: object::delay,
-        client,
-    }
 }
 
 /// True if the link is that of the client. It is not if the client was begun again since.
@@ -172,7 +168,7 @@ unsafe fn end(link: *mut Object) -> Status {
     if pointers::check(client) != Status::OK || (*object).queue.suspended {
         return Status::BUSY;
     }
-    let transport = (*link).transport;
+    let transport = (*link).kind.transport;
     (*object).kind = transport;
     (*object).linked = false;
     (*(*transport).port(object)).copy(&(*link).port);
@@ -215,8 +211,8 @@ functions! {
     /// @param maxDelayMs  the longest wait in milliseconds, 0 to 1000000; the default is 30000
     fn mbm_link_setBackoff(backoff: u8, delayMs: u32, maxDelayMs: u32)
         = with(|object| {
-            let policy = &mut (*object).core.policy;
-            set_backoff(policy, backoff, delayMs, maxDelayMs)
+            let waits = &mut (*object).core.waits;
+            set_backoff(waits, backoff, delayMs, maxDelayMs)
         });
 }
 
@@ -235,7 +231,7 @@ pub unsafe extern "C" fn mbm_link_setJitter(
     context: *mut c_void,
 ) -> u8 {
     with(link, |object| {
-        if !(*object).core.policy.set_jitter(percent, random.is_some()) {
+        if !(*object).core.waits.set_jitter(percent, random.is_some()) {
             return Status::INVALID_ARGUMENT;
         }
         (*object).random = random;

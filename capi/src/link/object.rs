@@ -2,7 +2,7 @@
 
 use crate::client::mbm_clientRequest;
 use crate::client::mbm_linkHooks;
-use crate::client::object::{self as client, LinkedKind, TransportKind};
+use crate::client::object::{self as client, LinkedKind};
 use crate::client::request::RequestPtr;
 use crate::pointers::{self, c_object};
 use crate::port::mbm_port;
@@ -48,8 +48,6 @@ pub struct Object {
     pub(super) status: u8,
     /// Bytes were read since this was last set to false.
     pub(super) has_read: bool,
-    /// The client's transport before the link began.
-    pub(super) transport: *const TransportKind,
     pub(super) port: mbm_port,
     pub(super) hooks: mbm_linkHooks,
     pub(super) random: Option<unsafe extern "C" fn(context: *mut c_void) -> u32>,
@@ -58,9 +56,19 @@ pub struct Object {
     pub(super) callback_context: *mut c_void,
     pub(super) counters: *mut mbm_linkCounters,
     pub(super) core: Link,
+    pub(super) pace: Pace,
     /// A request that is never sent. While the client is idle, it is in the client's queue. Its
     /// `done` calls `callback`, so `callback` may do what `done` of any request may.
     pub(super) request: mbm_clientRequest,
+}
+
+/// When the link is closed although it is good, and how long it rests after it was opened.
+#[repr(C)]
+pub(super) struct Pace {
+    /// The delay after connecting, in milliseconds.
+    pub(super) delay_ms: u16,
+    /// One of MBM_LINK_CLOSE_, and whether the delay is over. (In one byte: an object has no other.)
+    pub(super) flags: u8,
 }
 
 c_object! { mbm_link, *mut Object }
@@ -121,7 +129,7 @@ impl LinkHooks for Hooks {
 /// `link` is that of its client; the port's hooks that this calls must not use either.
 unsafe fn close(link: *mut Object) {
     let object = (*link).kind.client.cast();
-    ((*(*link).transport).release)(object, None);
+    ((*(*link).kind.transport).release)(object, None);
     client::queue(object).interrupt();
 }
 
@@ -200,12 +208,12 @@ unsafe fn advance_linked(
     if (*link).core.fails_requests() {
         queue.fail_all();
     } else if let (Some(since), false) = ((*link).core.waits_since(), queue.has_lost()) {
-        let transport = &*(*link).transport;
+        let transport = &*(*link).kind.transport;
         let timeout = transport.settings(object).response_timeout.get();
         queue.fail_overdue(now, since, timeout, transport.storage(object));
         (*link).core.has_timed_out = queue.has_lost();
     }
-    let mut ended = queue.end_lost(now, (*(*link).transport).storage(object))?;
+    let mut ended = queue.end_lost(now, (*(*link).kind.transport).storage(object))?;
     if (*link).core.has_timed_out {
         ended.state_mut().status = Status::CONNECT_TIMED_OUT;
     }
@@ -275,14 +283,14 @@ unsafe fn read_all(link: *mut Object, object: *mut client::Object, now: u32) -> 
 ///
 /// # Safety
 /// As for [`advance_linked`].
-unsafe fn advance_noting(
+pub(super) unsafe fn advance_noting(
     link: *mut Object,
     object: *mut client::Object,
     now: u32,
     fresh: bool,
 ) -> Option<RequestPtr> {
     (*link).has_read = false;
-    let ended = ((*(*link).transport).advance)(object, now, fresh);
+    let ended = ((*(*link).kind.transport).advance)(object, now, fresh);
     if (*link).has_read {
         client::queue(object).note_received();
     }
@@ -295,7 +303,10 @@ unsafe fn advance_noting(
 /// As for [`advance_linked`].
 unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u32) {
     let queue = client::queue(object);
-    let timeout = (*(*link).transport).settings(object).response_timeout.get();
+    let timeout = (*(*link).kind.transport)
+        .settings(object)
+        .response_timeout
+        .get();
     let (unanswered, in_flight) = (queue.unanswered, queue.in_flight());
     (*link)
         .core
@@ -311,7 +322,7 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
     if request.is_some() {
         (*link).core.cancelled = (*link).core.cancelled.saturating_add(1);
     }
-    ((*(*link).transport).release)(object, request);
+    ((*(*link).kind.transport).release)(object, request);
 }
 
 /// Counts an event. Returns the request whose `done` reports the event, if the program wants

@@ -2,6 +2,7 @@
 
 use super::mbm_plan;
 use super::setup::mbm_planSetup;
+use crate::client::object::queue;
 use crate::client::{self, mbm_client, mbm_client_cancel};
 use crate::pointers;
 use core::ptr::null_mut;
@@ -30,7 +31,8 @@ use mbm::plan::{Position, Read};
 /// @return MBM_OK. The status of a field: MBM_INVALID_ARGUMENT for an unknown table, type or order,
 ///         a type that the table does not have, bits beyond those of a register, a unit above 255,
 ///         an interval out of range, a negative divisor or a scale of a text;
-///         MBM_BROADCAST_NOT_ALLOWED for unit 0; MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
+///         MBM_BROADCAST_NOT_ALLOWED for unit 0, unless the client has TCP frames;
+///         MBM_ILLEGAL_DATA_ADDRESS if it goes beyond address
 ///         65535 or into an excluded range; MBM_ILLEGAL_DATA_VALUE if it is longer than a read may
 ///         be; MBM_BUFFER_TOO_SMALL for the first without storage for its read or its data. After
 ///         such a status the plan has ended, and `positions` and `reads` may be changed.
@@ -42,8 +44,15 @@ pub unsafe extern "C" fn mbm_plan_begin(
     setup: *const mbm_planSetup,
     field: *mut u16,
 ) -> u8 {
-    let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
-        group::group(setup.fields(), setup, positions, reads, setup.dataWords)
+    let group = |setup: &mbm_planSetup, unit_0, positions: &mut [Position], reads: &mut [Read]| {
+        group::group(
+            setup.fields(),
+            unit_0,
+            setup,
+            positions,
+            reads,
+            setup.dataWords,
+        )
     };
     let has_limits = setup.as_ref().is_some_and(mbm_planSetup::has_limits);
     begin(plan, client, setup, field, has_limits, group)
@@ -74,9 +83,16 @@ pub unsafe extern "C" fn mbm_plan_beginGrouped(
     counts: *const u16,
     field: *mut u16,
 ) -> u8 {
-    let group = |setup: &mbm_planSetup, positions: &mut [Position], reads: &mut [Read]| {
+    let group = |setup: &mbm_planSetup, unit_0, positions: &mut [Position], reads: &mut [Read]| {
         let counts = from_raw_parts(counts, reads.len());
-        group::take_groups(setup.fields(), counts, positions, reads, setup.dataWords)
+        group::take_groups(
+            setup.fields(),
+            unit_0,
+            counts,
+            positions,
+            reads,
+            setup.dataWords,
+        )
     };
     begin(plan, client, setup, field, !counts.is_null(), group)
 }
@@ -91,7 +107,7 @@ unsafe fn begin(
     setup: *const mbm_planSetup,
     field: *mut u16,
     is_usable: bool,
-    group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+    group: impl FnOnce(&mbm_planSetup, u16, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
 ) -> u8 {
     let mut wrong = u16::MAX;
     // `field` is NULL or what the header says.
@@ -110,7 +126,7 @@ unsafe fn attempt(
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
     is_usable: bool,
-    group: impl FnOnce(&mbm_planSetup, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+    group: impl FnOnce(&mbm_planSetup, u16, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
     wrong: &mut u16,
 ) -> Status {
     // Nothing uses the storage of a plan that is not begun.
@@ -133,7 +149,9 @@ unsafe fn attempt(
     let count = usize::from(given.fieldCount);
     let positions = from_raw_parts_mut(given.positions.cast(), count);
     let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
-    let count = match group(given, positions, reads) {
+    // In TCP frames unit 0 is a unit.
+    let has_unit_0 = u16::from(queue(pointers::object(client)).has_transaction_ids);
+    let count = match group(given, has_unit_0, positions, reads) {
         Ok(count) => count as u16,
         Err(refusal) => {
             *wrong = refusal.field as u16;

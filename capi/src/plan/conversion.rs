@@ -154,7 +154,7 @@ unsafe fn with_words<T>(
     use_words: impl FnOnce(&Words) -> Result<T, Error>,
 ) -> Result<T, Error> {
     let mut own: Field = *fields.add(field.into()).cast();
-    own.check().result()?;
+    own.check(1).result()?;
     if own.is_in_bits() {
         return Err(Error::INVALID_ARGUMENT);
     }

@@ -14,7 +14,7 @@ use mbm::plan::{ExcludedRange, Field, Position, Read, ReadLimits, UnitLimits};
 /// unit again and again. A table of them may be constant.
 #[repr(C)]
 pub struct mbm_planField {
-    /// The unit, 1 to 255. mbm_plan_begin refuses a greater number.
+    /// The unit, 1 to 255; in TCP frames also 0. mbm_plan_begin refuses any other number.
     pub unit: u16,
     /// One of MBM_TABLE_...
     pub table: u8,
@@ -48,7 +48,7 @@ pub struct mbm_planUnitLimits {
     pub bitsPerRead: u16,
     /// Registers, 1 to 125; 0 means as `registersPerRead` of the plan.
     pub registersPerRead: u16,
-    /// The unit, 1 to 255. mbm_plan_begin refuses a greater number.
+    /// The unit, 0 to 255. mbm_plan_begin refuses a greater number.
     pub unit: u16,
 }
 

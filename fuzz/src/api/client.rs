@@ -37,7 +37,7 @@ pub unsafe extern "C" fn random(_: *mut c_void) -> u32 {
 
 fn set(w: &World, client: *mut mbm_client) {
     let (byte, word, more, long) = (w.byte(), w.word(), w.word(), w.long());
-    let choice = w.byte() % 16;
+    let choice = w.byte() % 20;
     let counters: *mut mbm_counters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -80,6 +80,9 @@ fn set(w: &World, client: *mut mbm_client) {
         12 => call!(w, mbm_client_setCounters(client, counters)),
         13 => call!(w, mbm_client_setUnits(client, units, byte % 8)),
         14 => call!(w, mbm_client_setBusyRetries(client, byte, u32::from(word))),
+        15 => call!(w, mbm_client_setAccept(client, byte % 6)),
+        16 => call!(w, mbm_client_setLenient(client, byte & 3)),
+        17 => call!(w, mbm_client_setMessageWait(client, u32::from(word))),
         _ => call!(w, mbm_client_setUnits(client, none, byte)),
     });
 }

@@ -59,7 +59,7 @@ fn hooks(w: &World) -> *const mbm_linkHooks {
 
 fn set(w: &World, link: *mut mbm_link) {
     let (byte, word, more) = (w.byte(), w.word(), w.word());
-    let choice = w.byte() % 8;
+    let choice = w.byte() % 10;
     let counters: *mut mbm_linkCounters = if byte & 1 == 0 {
         null_mut()
     } else {
@@ -80,6 +80,8 @@ fn set(w: &World, link: *mut mbm_link) {
         3 => call!(w, mbm_link_setRequestsWait(link, byte & 3)),
         4 => call!(w, mbm_link_setCounters(link, counters)),
         5 => call!(w, mbm_link_setReplaceAfter(link, byte % 128)),
+        6 => call!(w, mbm_link_setClose(link, byte % 5)),
+        7 => call!(w, mbm_link_setDelayAfterConnect(link, u32::from(word))),
         _ => call!(w, mbm_link_setCallback(link, callback, context)),
     });
 }

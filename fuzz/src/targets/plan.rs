@@ -103,7 +103,7 @@ pub fn run(data: &[u8]) {
     let fields: Vec<Field> = (0..input.u8() % 24).map(|_| field(&mut input)).collect();
     let mut positions = vec![Position::NONE; fields.len()];
     let mut reads = vec![Read::default(); read_count];
-    let count = match group(&fields, &limits, &mut positions, &mut reads, words) {
+    let count = match group(&fields, 0, &limits, &mut positions, &mut reads, words) {
         Ok(count) => count,
         Err(refusal) => {
             assert!(refusal.status.is_failure() || refusal.status.is_exception());

@@ -5,6 +5,7 @@
 //! function needs few bytes for each.
 
 mod build;
+mod deviation;
 mod forward;
 mod pdu;
 mod restore;

@@ -77,6 +77,7 @@ impl RequestState {
     }
 
     /// Bytes of data in the response, if the request determines them; otherwise 0.
+    #[inline(always)]
     pub const fn known_data(&self) -> u8 {
         if self.data_at() > 0 && matches!(self.spec.0 & KIND, FIXED | READ) {
             self.rule.wrapping_sub(self.data_at())
@@ -127,6 +128,7 @@ impl RequestState {
     }
 
     /// True if `pdu`, complete or not, begins as the head of this request does.
+    #[inline(always)]
     pub fn matches_echo(&self, pdu: &[u8]) -> bool {
         for (ours, theirs) in self.head().iter().zip(pdu) {
             if ours != theirs {

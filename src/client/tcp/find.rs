@@ -1,13 +1,14 @@
 //! Finds responses in the received bytes of a TCP stream.
 
+use super::rules::Rules;
 use super::Tcp;
 use crate::bytes::move_to_front;
 use crate::client::queue::RequestQueue;
-use crate::client::request::{data_of, is_answer, store_response, ClientRequest};
+use crate::client::request::{is_answer, ClientRequest};
 use crate::client::storage::ClientStorage;
 use crate::engine::Counter;
 use crate::error::{Error, Status};
-use crate::frame::tcp::{self, Header};
+use crate::frame::tcp;
 use crate::port::Port;
 
 impl<P: Port, S: ClientStorage> Tcp<P, S> {
@@ -20,6 +21,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Ends the request at the index `at`, which was answered, with `status`.
+    #[inline(always)]
     fn end_answered<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -49,6 +51,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         &mut self,
         queue: &mut RequestQueue<J, N>,
         now: u32,
+        rules: &mut impl Rules,
     ) -> Option<J> {
         loop {
             if self.skip > 0 {
@@ -65,7 +68,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 }
             };
             let mut requests = queue.queue.iter_mut().enumerate();
-            let asked = requests.find(|(_, request)| is_answered_by(*request, &header));
+            let asked = requests.find(|(_, request)| rules.matches(request.state(), &header));
             if asked.is_none() && self.resyncing {
                 self.start += 1;
                 continue;
@@ -75,14 +78,17 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 return None;
             }
             let Some((at, request)) = asked else {
+                if self.in_flight == 0 {
+                    queue.changed |= rules.note_frame();
+                }
                 self.skip = header.total as u16;
                 self.note_foreign_frame(queue, header.transaction);
                 continue;
             };
             let mut status = Status::BUFFER_TOO_SMALL;
             if is_whole {
-                let pdu = rest.get(tcp::PDU..header.total);
-                status = validate(request, pdu.unwrap_or_default());
+                let pdu = rest.get_mut(tcp::PDU..header.total);
+                status = rules.validate(request, pdu.unwrap_or_default());
                 if self.resyncing && !is_answer(status) && status != Status::BUFFER_TOO_SMALL {
                     // These bytes only look like a header.
                     self.start += 1;
@@ -91,7 +97,14 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             }
             // Bytes of the frame that did not fit are skipped as they arrive.
             self.skip = header.total as u16;
+            let fits = is_whole && (is_answer(status) || status == Status::BUFFER_TOO_SMALL);
+            if !fits && rules.is_doubtful(request.state(), &header) {
+                self.note_foreign_frame(queue, header.transaction);
+                continue;
+            }
             self.skip_frame();
+            queue.changed |= rules.note_frame();
+            rules.note_end(now);
             if let Some(request) = self.end_answered(queue, at, status, now) {
                 return Some(request);
             }
@@ -119,7 +132,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 
     /// Counts a frame that answers no request. If it has the number of a request, records
     /// there that another unit answered.
-    #[cold]
+    #[inline(always)]
     fn note_foreign_frame<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -133,32 +146,4 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             }
         }
     }
-}
-
-/// True if a response with this header answers the request.
-fn is_answered_by<J: ClientRequest>(request: &J, header: &Header) -> bool {
-    let state = request.state();
-    state.is_sent() && state.wire == header.transaction && state.unit() == header.unit
-}
-
-/// Checks the response `pdu` and stores its data in the request. Returns the status of the
-/// request.
-fn validate<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> Status {
-    let state = request.state();
-    let [function, ..] = *pdu else {
-        return Status::MALFORMED_REPLY;
-    };
-    if function & 0x7F != state.function() {
-        return Status::INVALID_FUNCTION;
-    }
-    let status = state.validate(pdu, data_of(request));
-    if status == Status::OK {
-        return store_response(request, pdu);
-    }
-    if let [function, code] = *pdu {
-        if function & 0x80 != 0 {
-            request.state_mut().exception = code;
-        }
-    }
-    status
 }

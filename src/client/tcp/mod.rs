@@ -2,6 +2,10 @@
 //! transaction identifier in the header shows which request a response answers.
 
 mod find;
+mod rules;
+mod tolerant;
+
+pub use tolerant::{TolerantTcp, ACCEPT_TRANSACTION, ACCEPT_UNIT};
 
 use super::queue::RequestQueue;
 use super::request::{data_of, ClientRequest, RequestState, Stage};
@@ -12,6 +16,7 @@ use crate::engine::{Counter, Settings};
 use crate::error::Status;
 use crate::frame::tcp;
 use crate::port::Port;
+use rules::{Rules, Strict};
 
 /// A TCP stream. One request is in flight at a time, unless [`Tcp::set_in_flight`] allows more.
 /// Received bytes are in the frame buffer, bytes to send in [`ClientStorage::outgoing`].
@@ -41,6 +46,8 @@ pub struct Tcp<P, S> {
     accepts: bool,
     /// A queued request waits until another ends or the transmit buffer has space.
     blocked: bool,
+    /// Only one request may be in flight.
+    is_single: bool,
     /// The byte stream.
     pub port: P,
     /// The caller's buffers and records.
@@ -65,6 +72,7 @@ impl<P, S> Tcp<P, S> {
             resyncing: false,
             accepts: false,
             blocked: false,
+            is_single: false,
             port,
             storage,
             settings: Settings::DEFAULT,
@@ -72,9 +80,15 @@ impl<P, S> Tcp<P, S> {
     }
 
     /// Allows up to `most` requests in flight at the same time, at least 1, which is the default.
-    /// More are faster, but many servers take one at a time and drop the others.
-    pub fn set_in_flight(&mut self, most: u8) {
-        self.more_in_flight = most.saturating_sub(1);
+    /// More are faster, but many servers take one at a time and drop the others. False, with nothing
+    /// changed, if a [`TolerantTcp`] must not have more than one.
+    pub fn set_in_flight(&mut self, most: u8) -> bool {
+        let more = most.saturating_sub(1);
+        let is_allowed = more == 0 || !self.is_single;
+        if is_allowed {
+            self.more_in_flight = more;
+        }
+        is_allowed
     }
 
     fn clear(&mut self) {
@@ -113,12 +127,60 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         true
     }
 
+    /// As [`Transport::advance`], by these rules.
+    #[inline(always)]
+    fn advance_by<J: ClientRequest, const N: usize>(
+        &mut self,
+        queue: &mut RequestQueue<J, N>,
+        now: u32,
+        fresh: bool,
+        rules: &mut impl Rules,
+    ) -> Option<J> {
+        if queue.queue.is_empty() {
+            return None;
+        }
+        // Bytes are read also while all requests only wait. If they stayed in the port, a
+        // program that waits for bytes in select would wake up at once.
+        let reads =
+            rules.reads_first() || self.in_flight > 0 || queue.is_held || queue.delay(now) > 0;
+        let mut fresh = fresh && reads;
+        loop {
+            if self.start < self.end {
+                if let Some(request) = self.find(queue, now, rules) {
+                    return Some(request);
+                }
+            }
+            if !fresh {
+                if queue.is_held {
+                    return None;
+                }
+                let rest = match self.in_flight {
+                    0 => rules.rest(now),
+                    _ => 0,
+                };
+                if rest == 0 {
+                    return self.send(queue, now, rules);
+                }
+                queue.set_next_due(now, rest);
+                return match self.flush(queue) {
+                    true => None,
+                    false => self.end_all_lost(queue, now),
+                };
+            }
+            if !self.read_bytes() {
+                return self.end_all_lost(queue, now);
+            }
+            fresh = false;
+        }
+    }
+
     /// Ends the requests whose time is over, and sends queued requests. Returns a request
     /// that has ended.
     fn send<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
         now: u32,
+        rules: &mut impl Rules,
     ) -> Option<J> {
         let mut stuck = false;
         if self.in_flight == 0 && self.sent < self.filled {
@@ -129,12 +191,15 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         }
         let mut reads_left = u8::MAX;
         while queue.delay(now) == 0 {
-            let Some((at, status)) = self.advance_queue(queue, now, stuck) else {
+            let Some((at, status)) = self.advance_queue(queue, now, stuck, rules) else {
                 break;
             };
             let unanswered = queue.unanswered;
-            if let Some(request) = self.conclude(queue, at, status, now, &mut reads_left) {
+            if let Some(request) = self.conclude(queue, at, status, now, &mut reads_left, rules) {
                 return Some(request);
+            }
+            if rules.is_single() {
+                break;
             }
             let again = queue.queue.get(at).map(ClientRequest::state);
             if queue.unanswered != unanswered && again.is_some_and(|state| state.wait == 0) {
@@ -158,6 +223,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         mut status: Status,
         now: u32,
         reads_left: &mut u8,
+        rules: &mut impl Rules,
     ) -> Option<J> {
         if status == Status::PENDING {
             // At the deadline, all bytes that have arrived are searched, even if the
@@ -173,10 +239,11 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                     // that hides the response.
                     self.skip_byte();
                 }
-                return self.find(queue, now);
+                return self.find(queue, now, rules);
             }
             self.in_flight = self.in_flight.wrapping_sub(1);
             status = self.expire(queue.queue.get(at)?);
+            rules.note_end(now);
         }
         queue.end(at, status, now, &mut self.storage)
     }
@@ -190,6 +257,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         queue: &mut RequestQueue<J, N>,
         now: u32,
         stuck: bool,
+        rules: &mut impl Rules,
     ) -> Option<(usize, Status)> {
         let mut least = u32::MAX;
         self.blocked = false;
@@ -209,7 +277,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
                 if !state.is(Stage::Queued) {
                     break Status::LINK_LOST;
                 }
-                match self.encode(request, now, stuck) {
+                match self.encode(request, now, stuck, rules) {
                     Status::OK => {
                         wait = request.state().wait;
                         if self.next as u8 == 0 {
@@ -231,20 +299,29 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Advances `next`, a multiple of 256, to the first block of 256 numbers that no request
     /// in flight uses. At most 255 requests are in flight, so there is such a block. The
     /// other 255 numbers of the block then need no search of the queue.
-    #[cold]
+    #[inline(always)]
     fn skip_numbers_in_use<J: ClientRequest>(&mut self, queue: &[J]) {
-        while queue.iter().any(|request| {
+        let mut at = 0;
+        while let Some(request) = queue.get(at) {
             let state = request.state();
-            state.is_sent() && state.wire >> 8 == self.next >> 8
-        }) {
-            self.next = self.next.wrapping_add(256);
+            at += 1;
+            if state.is_sent() && state.wire >> 8 == self.next >> 8 {
+                self.next = self.next.wrapping_add(256);
+                at = 0;
+            }
         }
     }
 
     /// Appends the frame of a request to the transmit buffer. Returns [`Status::BUSY`] if
     /// the request has to wait for others, [`Status::LINE_BUSY`] if the bytes before it are
     /// `stuck`, [`Status::BUFFER_TOO_SMALL`] if the buffer can never hold it.
-    fn encode<J: ClientRequest>(&mut self, request: &mut J, now: u32, stuck: bool) -> Status {
+    fn encode<J: ClientRequest>(
+        &mut self,
+        request: &mut J,
+        now: u32,
+        stuck: bool,
+        rules: &mut impl Rules,
+    ) -> Status {
         if self.in_flight > self.more_in_flight {
             return Status::BUSY;
         }
@@ -258,6 +335,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
         };
         self.storage.count(Counter::Requests, 1);
         let wait = self.time_of(request.state());
+        rules.note_sent(now, wait, &self.settings, request.state());
         let state = request.state_mut();
         state.wire = self.next;
         state.enter(Stage::Sent, now, wait);
@@ -268,6 +346,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Microseconds for which a request waits when it was sent.
+    #[inline(always)]
     fn time_of(&mut self, state: &RequestState) -> u32 {
         if state.is_answered() {
             state.response_timeout(&self.storage, self.settings.response_timeout.get())
@@ -302,7 +381,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     /// Sends the rest of a request that has ended, the only bytes in the transmit buffer.
     /// Returns true if the port accepts none of them: requests that wait for their space
     /// would wait for ever. `None` if the link is lost.
-    #[cold]
+    #[inline(always)]
     fn flush_remainder<J: ClientRequest, const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -344,7 +423,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
     }
 
     /// Counts a request whose time is over, and discards its unsent bytes. Returns its status.
-    #[cold]
+    #[inline(always)]
     fn expire<J: ClientRequest>(&mut self, request: &J) -> Status {
         let state = request.state();
         if !state.is_answered() {
@@ -379,6 +458,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
 
 /// Writes the frame of any request into `buffer` from the index `begin` on, and returns the index
 /// after its end; `None` if there is no space for it.
+#[inline(always)]
 fn write_frame<J: ClientRequest>(
     request: &J,
     buffer: &mut [u8],
@@ -419,31 +499,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         now: u32,
         fresh: bool,
     ) -> Option<J> {
-        if queue.queue.is_empty() {
-            return None;
-        }
-        // Bytes are read also while all requests only wait. If they stayed in the port, a
-        // program that waits for bytes in select would wake up at once.
-        let mut fresh = fresh && (self.in_flight > 0 || queue.is_held || queue.delay(now) > 0);
-        loop {
-            if self.start < self.end {
-                if let Some(request) = self.find(queue, now) {
-                    return Some(request);
-                }
-            }
-            if !fresh {
-                return match queue.is_held {
-                    true => None,
-                    false => self.send(queue, now),
-                };
-            }
-            if !self.read_bytes() {
-                return self.end_all_lost(queue, now);
-            }
-            fresh = false;
-        }
+        self.advance_by(queue, now, fresh, &mut Strict)
     }
 
+    #[inline(always)]
     fn release(&mut self, request: Option<&J>) {
         let Some(request) = request else {
             return self.clear();
