@@ -103,6 +103,8 @@ struct State {
     is_other: bool,
     /// Since the last response, bytes have arrived that may be a damaged echo of it.
     may_be_damaged: bool,
+    /// A request has arrived since the last response that the server may take for its echo.
+    may_be_echoed: bool,
     /// The server cannot know yet that the line has no echo.
     may_be_echo: bool,
     last_response: Vec<u8>,
@@ -122,6 +124,7 @@ impl State {
             due: 0,
             is_other: false,
             may_be_damaged: false,
+            may_be_echoed: false,
             may_be_echo: true,
             last_response: Vec::new(),
             since_response: LONG,
@@ -162,6 +165,7 @@ impl State {
         if !sent.is_empty() {
             self.sent += 1;
             self.since_response = 0;
+            self.may_be_echoed = false;
             if self.hearing == Hearing::Itself {
                 self.echo.extend(&sent);
                 self.held = 0;
@@ -197,7 +201,9 @@ impl State {
                 let is_same = bytes == self.last_response && self.since_response < 2 * LONG / 10;
                 // Other bytes may be in front, and be lost with it or not.
                 let is_due = self.alone && !(is_same && self.may_be_echo);
-                self.is_other = !is_same && self.sent > 0 && !self.may_be_damaged;
+                self.is_other =
+                    !is_same && self.sent > 0 && !self.may_be_damaged && !self.may_be_echoed;
+                self.may_be_echoed |= is_same;
                 self.may_be_damaged = false;
                 self.requests += 1;
                 if matches!(event, Event::Blocks(_)) {
