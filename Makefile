@@ -264,6 +264,7 @@ $(BUILD)/$(1)/%.o: examples/%.c
 $(BUILD)/$(1)/cli/%.o: cli/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $(TOOL_FLAGS) -c $$< -o $$@
+$(BUILD)/$(1)/cli/page.o: cli/page.html
 $(BUILD)/$(1)/%.o: ports/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
@@ -379,7 +380,7 @@ tool: ## Build the command line tool, build/plain/mbm
 # The tool as it is installed: optimised and hardened, over the library of the ports.
 INSTALLED_TOOL := $(BUILD)/linux/mbm
 HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE -pie -Wl,-z,relro,-z,now,--as-needed
-$(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h)
+$(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h) cli/page.html
 	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
 	@gcc -std=c11 $(HARDENED) $(TOOL_FLAGS) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
 

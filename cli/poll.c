@@ -2,10 +2,12 @@
 #include "advice.h"
 #include "clock.h"
 #include "device_file.h"
+#include "live.h"
 #include "numbers.h"
 #include "options.h"
-#include "polled.h"
 #include "report.h"
+#include "screen.h"
+#include "trace.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -24,6 +26,7 @@ typedef struct polling {
     uint8_t shows_plan;
 
     polled read;
+    live live;
     struct {
         uint8_t status, exception;
         uint16_t field;
@@ -33,7 +36,21 @@ typedef struct polling {
 
 /* --- the command line --- */
 
-enum { ROUNDS = 0x2000, FOR, ONCE, GAP, SHOW_PLAN };
+enum { ROUNDS = 0x2000, FOR, ONCE, GAP, SHOW_PLAN, WATCH, HTTP };
+
+/* Refuses a table where there can be none. */
+static void check_watch(const struct argp_state *state)
+{
+    const char *wrong = screen_wrong();
+
+    if (options.is_json)
+        options_wrong(state, "--watch and --json exclude each other");
+    if (wrong)
+        options_wrong(state, "--watch: %s. Leave it out to print each round", wrong);
+    if (trace_is_printed() && isatty(STDERR_FILENO))
+        options_wrong(state, "--watch and --trace write to the same terminal. Send stderr to a "
+                             "file: 2>trace.txt");
+}
 
 static error_t parse(int key, char *text, struct argp_state *state)
 {
@@ -47,6 +64,12 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case ONCE: p->rounds = 1; return 0;
     case GAP: p->gap = (int)options_number(state, "--gap", text, 0, 2000); return 0;
     case SHOW_PLAN: p->shows_plan = 1; return 0;
+    case WATCH: p->live.watches = 1; return 0;
+    case HTTP:
+        p->live.http_place = text;
+        if (http_check(text, 1))
+            options_wrong(state, "--http \"%s\" %s", text, http_check(text, 1));
+        return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 1)
             options_too_many(state, text);
@@ -58,6 +81,8 @@ static error_t parse(int key, char *text, struct argp_state *state)
     case ARGP_KEY_END:
         if (!p->file)
             options_wrong(state, "%s is missing", p->where.text ? "FILE" : "LINE");
+        if (p->live.watches)
+            check_watch(state);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -71,6 +96,10 @@ static const struct argp_option texts[] = {
      "One request may read up to N addresses between two fields too, if the device has them (gap "
      "of FILE, or 0)",
      1},
+    {"watch", WATCH, NULL, 0,
+     "Show a table that stays in its place, with changes, minimum and maximum; q ends it", 3},
+    {"http", HTTP, "[ADDRESS:]PORT", 0,
+     "Show the same on a page, with a chart, at 127.0.0.1 or another address of this machine", 3},
     {"show-plan", SHOW_PLAN, NULL, 0, "First print the requests of the plan to stderr", 3},
     {0}};
 
@@ -84,7 +113,8 @@ static const struct argp arguments = {
         "Reads the fields of a device file, each at its interval, in the fewest requests. A round is "
         "the shortest interval; at its end the values are printed with their age and status.\v"
         "docs/device-file.md describes the device file.\n\n"
-        "  mbm poll rtu:/dev/ttyUSB0 meter.yaml --rounds 10\n\n" PLACE_HELP,
+        "  mbm poll rtu:/dev/ttyUSB0 meter.yaml --rounds 10\n"
+        "  mbm poll tcp://192.168.0.7 pump.yaml --watch --http 8080\n\n" PLACE_HELP,
     .children = children};
 
 /* --- the plan --- */
@@ -96,6 +126,8 @@ static void take_field(void *context, mbm_plan *of, uint16_t field)
     const uint8_t status = mbm_plan_getStatus(of, field, NULL);
     const char *why;
 
+    if (live_is_wanted(&p->live))
+        live_note(&p->live, field);
     line_note(&p->read.at, status);
     why = line_why(&p->read.at, status);
     if (status == MBM_OK || status == MBM_CANCELLED || report_stopped)
@@ -144,31 +176,21 @@ static void show_plan(polling *p)
 
 /* --- showing --- */
 
-/* How wide a text is on a terminal: its characters, if it is UTF-8. */
-static int width_of(const char *text)
-{
-    int width = 0;
-
-    for (; *text; text++)
-        width += ((unsigned char)*text & 0xC0) != 0x80;
-    return width;
-}
-
 static int longest_name(polling *p)
 {
     int longest = 0;
     uint16_t i;
 
     for (i = 0; i < p->read.meter.readable; i++)
-        if (width_of(p->read.meter.fields[i].name) > longest)
-            longest = width_of(p->read.meter.fields[i].name);
+        if (screen_width(p->read.meter.fields[i].name) > longest)
+            longest = screen_width(p->read.meter.fields[i].name);
     return longest < LONGEST_NAME ? longest : LONGEST_NAME;
 }
 
 /* Prints a text in a column. */
 static void print_column(const char *text, int width)
 {
-    printf("  %s%*s", text, width > width_of(text) ? width - width_of(text) : 0, "");
+    printf("  %s%*s", text, width > screen_width(text) ? width - screen_width(text) : 0, "");
 }
 
 static void print_row(polling *p, uint16_t field, int name_width)
@@ -219,7 +241,9 @@ static void show_round(polling *p, uint32_t round)
     uint16_t i;
 
     (void)clock_now_text(time);
-    if (!options.is_json)
+    if (live_is_wanted(&p->live))
+        live_note_round(&p->live, round);
+    else if (!options.is_json)
         print_rows(p, round, time);
     for (i = 0; options.is_json && i < p->read.meter.readable; i++)
         print_json(p, i, round, time);
@@ -294,7 +318,12 @@ static void rest(polling *p, uint32_t milliseconds)
 {
     const uint32_t delay = mbm_plan_pollDelay(&p->read.plan) / 1000;
 
-    line_rest(&p->read.at, delay < milliseconds ? delay : milliseconds);
+    if (delay < milliseconds)
+        milliseconds = delay;
+    if (live_is_wanted(&p->live))
+        live_wait(&p->live, milliseconds);
+    else
+        line_rest(&p->read.at, milliseconds);
 }
 
 /* The first round ends when every field was read or failed, each other one an interval later. */
@@ -303,7 +332,8 @@ static void poll_rounds(polling *p)
     const uint32_t interval = shortest_interval(p), start = line_milliseconds();
     uint32_t round = 0, due = start;
 
-    while (!report_stopped && !ferror(stdout) && (p->rounds == 0 || round < p->rounds)) {
+    while (!report_stopped && !ferror(stdout) && !p->live.is_over &&
+           (p->rounds == 0 || round < p->rounds)) {
         const uint32_t now = line_milliseconds();
         uint32_t left = 1000;
 
@@ -323,6 +353,8 @@ static void poll_rounds(polling *p)
             left = p->forMs - (now - start);
         rest(p, left);
     }
+    if (live_is_wanted(&p->live))
+        live_end(&p->live);
     show_end(p, round);
 }
 
@@ -345,6 +377,8 @@ int poll_command(int argc, char **argv)
             code = begin_plan(p);
         if (code == CODE_DONE && p->shows_plan)
             show_plan(p);
+        if (code == CODE_DONE && live_is_wanted(&p->live))
+            code = live_begin(&p->live, &p->read, shortest_interval(p));
         if (code == CODE_DONE)
             poll_rounds(p);
         (void)mbm_plan_end(&p->read.plan);

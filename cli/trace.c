@@ -100,6 +100,11 @@ void trace_print(void)
     is_printed = 1;
 }
 
+int trace_is_printed(void)
+{
+    return is_printed;
+}
+
 int trace_write(const char *path)
 {
     if (!is_printed && !pcap)

@@ -14,6 +14,9 @@
 void trace_print(void);
 int trace_write(const char *path);
 
+/* Whether frames are printed. */
+int trace_is_printed(void);
+
 /* Returns the port to use instead of the port of a master or client, or of a server. `framing`
  * is one of MBM_FRAMING_. `name` tells the link from others; a link with the same name as one
  * before takes its place. */

@@ -154,6 +154,12 @@ docs: ## Make the documentation site, build/site, and check its links, entries a
 docs-serve: docs ## Make the site and serve it at http://127.0.0.1:8000/
 	@python3 -m http.server --bind 127.0.0.1 --directory $(BUILD)/site 8000
 
+.PHONY: check-poll-page
+check-poll-page: tool ## Open the page of mbm poll --http in Chromium, as a desktop and a phone, light and dark
+	@scripts/need chromium
+	@scripts/venv $(BUILD)/venv-browser browser
+	@$(BUILD)/venv-browser/bin/python -B scripts/check/poll-page $(BUILD)/plain/mbm --screenshots
+
 .PHONY: check-docs-site
 check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
 	@scripts/need chromium

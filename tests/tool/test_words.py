@@ -171,6 +171,15 @@ poll @LINE @FILE more|"more" is one word too many
 poll @LINE @FILE --rounds 0|--rounds "0" is out of range
 poll @LINE @FILE --for 10|--for "10" is not a time
 poll @LINE @FILE --gap 2001|--gap "2001" is out of range
+poll @LINE @FILE --watch|--watch: standard output is no terminal. Leave it out to print each round.
+poll @LINE @FILE --watch --json|--watch and --json exclude each other
+poll @LINE @FILE --http localhost:8080|--http "localhost:8080" is not a port, or an address in numbers and a port
+poll @LINE @FILE --http 8080x|is not a port, or an address in numbers
+poll @LINE @FILE --http 65536|is not a port, or an address in numbers
+poll @LINE @FILE --http 127.0.0.1|is not a port, or an address in numbers
+poll @LINE @FILE --http ::1:80|is not a port, or an address in numbers
+poll @LINE @FILE --http [::1]|is not a port, or an address in numbers
+poll @LINE @FILE --http :80|is not a port, or an address in numbers
 poll @LINE @BAD|@BAD:5: type: "real" is not one of bit, uint16,
 poll @LINE @WRITTEN|@WRITTEN has no field that can be read
 1 serve pty: /nowhere.yaml|/nowhere.yaml: No such file or directory

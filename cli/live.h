@@ -1,0 +1,40 @@
+/* The table and the page of mbm poll while it polls: both show the values at any time, and wait
+ * together with the line.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#ifndef LIVE_H
+#define LIVE_H
+
+#include "page.h"
+#include "watch.h"
+
+typedef struct live {
+    /* What the command line says. */
+    uint8_t watches;        /* --watch */
+    const char *http_place; /* --http; NULL: no page */
+
+    polled *of;
+    followed followed;
+    watch watch;
+    page page;
+    uint8_t is_new, is_over; /* something is to be drawn; the user has ended it */
+    int64_t drawn_at;
+} live;
+
+/* Whether there is a table or a page. */
+int live_is_wanted(const live *l);
+
+/* Begins both; the fields are read every `intervalMs` at the soonest. Returns CODE_DONE, or another
+ * exit code after reporting the reason. */
+int live_begin(live *l, polled *of, uint32_t intervalMs);
+void live_end(live *l);
+
+/* A read of a field has ended; a round has. */
+void live_note(live *l, uint16_t field);
+void live_note_round(live *l, uint32_t round);
+
+/* Waits for the line, for keys and for visitors of the page, at most for a time, and serves them.
+ */
+void live_wait(live *l, uint32_t milliseconds);
+
+#endif
