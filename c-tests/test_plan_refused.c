@@ -439,7 +439,8 @@ TEST(a_conversion_of_registers_refuses_null_and_what_the_registers_lack)
     GETS(MBM_INVALID_ARGUMENT, mbm_registers_getDecimal(&one, fields, 1, 0, NULL, 0, &value.int32));
     GETS(MBM_INVALID_ARGUMENT,
          mbm_registers_getConverted(&one, fields, 0, 0, &real, &value.number));
-    GETS(MBM_NOT_INITIALISED, mbm_registers_getConverted(&empty, fields, 0, 0, NULL, &value.number));
+    GETS(MBM_NOT_INITIALISED,
+         mbm_registers_getConverted(&empty, fields, 0, 0, NULL, &value.number));
     IS(MBM_NOT_INITIALISED, mbm_registers_checkAvailable(&empty, fields, 0, 0, NULL));
     assert_int_equal(mbm_registers_ofWords(&one, words, 1, 1), MBM_OK);
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_checkAvailable(&one, fields, 1, 0, NULL));

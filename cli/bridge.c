@@ -319,6 +319,7 @@ static const stats_kind KINDS[] = {
     {"lost_writes", "Writes that found no place.", 1},
     {"reloads", "How often files came in force.", 1},
     {"reload_failures", "How often files were refused.", 1},
+    {"values_not_available", "Values that are not available, as their devices say.", 0},
 };
 
 static void fill_stats(void *context, stats *numbers)
@@ -337,6 +338,9 @@ static void fill_stats(void *context, stats *numbers)
     numbers->values[5] = atomic_load(&b->settings.mqtt.lost);
     numbers->values[6] = b->reloads;
     numbers->values[7] = b->refused_reloads;
+    numbers->values[8] = 0;
+    for (i = 0; i < b->line_count; i++)
+        numbers->values[8] += bridge_line_not_available(b->lines[i]);
     for (i = 0; i < b->line_count; i++) {
         const line *at = &b->lines[i]->at;
         const int has_link = at->place.kind != PLACE_UDP;

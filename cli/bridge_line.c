@@ -7,6 +7,7 @@
 #include "device_file.h"
 #include "device_plan.h"
 #include "discovery.h"
+#include "numbers.h"
 #include "report.h"
 
 #include <stdio.h>
@@ -212,7 +213,7 @@ static void publish_value(bridge_line *l, uint16_t field)
 
     if (l->bridge->is_plain) {
         /* Plain text has no place for a status: what failed is not published. */
-        if (what->value && what->status == MBM_OK)
+        if (what->value && (what->status == MBM_OK || what->status == MBM_NOT_AVAILABLE))
             publish(l, name, NULL, value, 1);
         return;
     }
@@ -225,26 +226,48 @@ static void publish_value(bridge_line *l, uint16_t field)
     publish(l, name, NULL, json, 1);
 }
 
-/* Called by the plan for each field whose read has ended. */
-static void on_update(void *context, mbm_plan *ended, uint16_t field)
+/* Takes the value and the status that a field has now. Returns whether they are new. */
+static int take_value(bridge_line *l, uint16_t field)
 {
     static char text[DEVICE_TEXT_LONGEST];
-    bridge_line *l = (bridge_line *)context;
+    const device *of = &l->table->fields;
     published *was = &l->table->last[field];
-    const uint8_t status = mbm_plan_getStatus(ended, field, NULL);
-    int is_new = l->bridge->is_every || status != was->status || !was->has_ended;
+    const uint8_t status = device_plan_status(&l->plan, of, field, NULL);
+    int is_new = status != was->status || !was->has_ended;
 
-    if (status == MBM_OK &&
-        device_plan_text(ended, &l->table->fields, field, !l->bridge->is_plain, text) &&
+    /* "None" is unknown to Home Assistant. */
+    if ((status == MBM_OK || status == MBM_NOT_AVAILABLE) &&
+        device_plan_text(&l->plan, of, field, !l->bridge->is_plain, "None", text) &&
         (!was->value || strcmp(text, was->value) != 0)) {
         free(was->value);
         was->value = strdup(text);
         is_new = 1;
     }
     was->status = status;
-    update_unit(l, field, status);
+    return is_new;
+}
+
+/* Publishes the fields whose power of ten has changed. */
+static void update_scaled(bridge_line *l, uint16_t power)
+{
+    uint16_t field;
+
+    for (field = 0; field < l->table->fields.readable; field++)
+        if (l->table->fields.fields[field].power_field == power &&
+            l->table->last[field].has_ended && take_value(l, field))
+            publish_value(l, field);
+}
+
+/* Called by the plan for each field whose read has ended. */
+static void on_update(void *context, mbm_plan *ended, uint16_t field)
+{
+    bridge_line *l = (bridge_line *)context;
+    const int is_new = take_value(l, field) || l->bridge->is_every;
+
+    update_unit(l, field, mbm_plan_getStatus(ended, field, NULL));
     if (is_new)
         publish_value(l, field);
+    update_scaled(l, field);
 }
 
 static const discovery_line *discovery_of(const bridge_line *l)
@@ -352,11 +375,13 @@ static void on_written(void *context, mbm_clientRequest *request)
 }
 
 /* Writes bits of a register, by function 22: the device changes no other bit. */
-static uint8_t write_part(bridge_line *l, bridge_write *write, const mbm_planField *planned,
-                          const broker_event *event, const char **wrong)
+static uint8_t write_part(bridge_line *l, bridge_write *write, const value_form *as,
+                          const mbm_planField *planned, const broker_event *event,
+                          const char **wrong)
 {
     const value_form form = {.type = planned->count == 1 ? MBM_TYPE_BIT : MBM_TYPE_UINT16,
-                             .order = MBM_ORDER_ABCD};
+                             .order = MBM_ORDER_ABCD,
+                             .conversion = as->conversion};
     uint16_t bits[VALUE_WORDS] = {0};
 
     if (payload_parse(&form, event->bytes + event->name_bytes, event->length, bits, wrong) == 0)
@@ -382,13 +407,12 @@ static void pack_coils(const uint16_t *bits, uint16_t count, void *bytes)
 }
 
 static uint8_t write_all(bridge_line *l, bridge_write *write, const device_field *field,
-                         const mbm_planField *planned, const broker_event *event,
-                         const char **wrong)
+                         const value_form *form, const mbm_planField *planned,
+                         const broker_event *event, const char **wrong)
 {
     static uint16_t words[PAYLOAD_WORDS];
-    const uint16_t count =
-        payload_parse_all(&field->form, planned->count, event->bytes + event->name_bytes,
-                          event->length, words, wrong);
+    const uint16_t count = payload_parse_all(form, planned->count, event->bytes + event->name_bytes,
+                                             event->length, words, wrong);
     const int is_single = count == 1 && field->write_function != DEVICE_MULTIPLE;
 
     if (count == 0)
@@ -431,10 +455,17 @@ static const char *begin_write(bridge_line *l, const char *name, const broker_ev
     const char *wrong = check_write(l, field, event);
     bridge_write *write = l->writes;
     const mbm_planField *planned;
+    value_form form;
     uint8_t status;
+    int power;
 
     if (wrong)
         return wrong;
+    power = l->table->fields.fields[field].power_field;
+    if (device_plan_form(&l->plan, &l->table->fields, (uint16_t)field, &form) != MBM_OK ||
+        (power >= 0 && mbm_plan_getStatus(&l->plan, (uint16_t)power, NULL) != MBM_OK))
+        return say("the power of ten of the field, %s, is not available",
+                   l->table->fields.fields[field].power_name);
     while (write < l->writes + BRIDGE_WRITES && write->is_used)
         write++;
     if (write == l->writes + BRIDGE_WRITES)
@@ -447,9 +478,9 @@ static const char *begin_write(bridge_line *l, const char *name, const broker_ev
     write->request.data = write->words;
     write->request.done = on_written;
     write->request.context = write;
-    status = device_is_part(planned)
-                 ? write_part(l, write, planned, event, &wrong)
-                 : write_all(l, write, &l->table->fields.fields[field], planned, event, &wrong);
+    status = device_is_part(planned) ? write_part(l, write, &form, planned, event, &wrong)
+                                     : write_all(l, write, &l->table->fields.fields[field], &form,
+                                                 planned, event, &wrong);
     if (wrong)
         return wrong;
     if (status != MBM_OK && status != MBM_PENDING)
@@ -519,6 +550,16 @@ void bridge_line_replace(bridge_line *l, bridge_table *next)
     bridge_table_free(before);
     if (l->bridge->has_discovery)
         discover(l);
+}
+
+unsigned bridge_line_not_available(const bridge_line *l)
+{
+    unsigned count = 0;
+    uint16_t field;
+
+    for (field = 0; field < l->table->fields.readable; field++)
+        count += l->table->last[field].status == MBM_NOT_AVAILABLE;
+    return count;
 }
 
 void bridge_line_clear(bridge_line *l)

@@ -97,6 +97,9 @@ void bridge_line_end(bridge_line *l);
 
 void bridge_line_poll(bridge_line *l);
 
+/* How many of its values are not available. */
+unsigned bridge_line_not_available(const bridge_line *l);
+
 /* For how many microseconds the line has nothing to do. */
 uint32_t bridge_line_delay(bridge_line *l);
 

@@ -68,6 +68,11 @@ void device_free(device *into)
         free(field->description);
         free(field->words);
         free(field->press);
+        free(field->power_name);
+        free(field->power_plain);
+        if (field->conversion)
+            free(field->conversion->numbers);
+        free(field->conversion);
     }
     free(into->fields);
     free(into->planned);

@@ -4,6 +4,7 @@
 #ifndef DEVICE_H
 #define DEVICE_H
 
+#include "conversion.h"
 #include "value.h"
 
 /* What a field allows. */
@@ -26,8 +27,8 @@ typedef struct device_limits {
     uint8_t excluded_count;
 } device_limits;
 
-/* Bytes of the longest name. */
-enum { DEVICE_NAME_BYTES = 200 };
+/* Bytes of the longest name; the greatest power of ten that a device has for a number. */
+enum { DEVICE_NAME_BYTES = 200, DEVICE_POWER = 10 };
 
 /* A number of an enumeration and its name. */
 typedef struct device_label {
@@ -53,6 +54,13 @@ typedef struct device_field {
     uint8_t has_state_class, state_class;
     char *press;          /* what a button writes; NULL: it is none */
     int line, scale_line; /* of the file */
+    /* What its numbers mean beyond the scale; NULL for nothing. `form` has it too. */
+    conversion *conversion;
+    /* The name and the index of the field that has its power of ten; NULL and -1 without one. The
+     * scale of `form` is then the power that the file gives that field. */
+    char *power_name, *power_plain; /* as in the file; in a repetition without its number too */
+    int power_field;
+    const void *late_value; /* for device_file.c */
 } device_field;
 
 typedef struct device {

@@ -9,6 +9,7 @@
 #include "device_limits.h"
 #include "device_names.h"
 #include "device_repeat.h"
+#include "device_values.h"
 #include "report.h"
 
 #include <errno.h>
@@ -29,11 +30,13 @@ enum {
     ONE_BASED,
     DEVICE_WRITE_FUNCTION,
     LIMITS,
-    DEVICE_KEYS = LIMITS + LIMITS_KEYS
+    DEVICE_NOT_AVAILABLE = LIMITS + LIMITS_KEYS,
+    DEVICE_KEYS
 };
 static const char *const DEVICE_NAMES[] = {
-    "device",    "unit",           "interval",          "order", "mask_write", "fields", "notation",
-    "one_based", "write_function", DEVICE_LIMITS_NAMES, NULL};
+    "device",        "unit",     "interval",  "order",          "mask_write",
+    "fields",        "notation", "one_based", "write_function", DEVICE_LIMITS_NAMES,
+    "not_available", NULL};
 enum {
     NAME,
     TABLE,
@@ -55,15 +58,22 @@ enum {
     DEVICE_CLASS,
     STATE_CLASS,
     PRESS,
+    NOT_AVAILABLE,
+    OFFSET,
+    PRECISION,
+    MIN_VALUE,
+    MAX_VALUE,
+    STEP,
     FIELD_KEYS
 };
 static const char *const FIELD_NAMES[] = {
-    "name",   "table",        "address",     "type",
-    "bit",    "count",        "scale",       "unit_of_measurement",
-    "access", "interval",     "value",       "unit",
-    "order",  "description",  "enumeration", "write_function",
-    "repeat", "device_class", "state_class", "press",
-    NULL};
+    "name",          "table",        "address",     "type",
+    "bit",           "count",        "scale",       "unit_of_measurement",
+    "access",        "interval",     "value",       "unit",
+    "order",         "description",  "enumeration", "write_function",
+    "repeat",        "device_class", "state_class", "press",
+    "not_available", "offset",       "precision",   "min_value",
+    "max_value",     "step",         NULL};
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
@@ -197,26 +207,20 @@ static int read_access(yaml_file *file, const yaml_node_t *node, const mbm_planF
     return 1;
 }
 
-static int read_scale(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                      device_field *field)
+/* Reads what the numbers of a field mean. `shared` is not_available at the head of the file. */
+static int read_meaning(yaml_file *file, const yaml_node_t *const *values,
+                        const yaml_node_t *shared, const mbm_planField *planned,
+                        device_field *field)
 {
-    const char *text;
+    const device_values keys = {.scale = values[SCALE],
+                                .offset = values[OFFSET],
+                                .precision = values[PRECISION],
+                                .not_available = values[NOT_AVAILABLE],
+                                .least = values[MIN_VALUE],
+                                .most = values[MAX_VALUE],
+                                .step = values[STEP]};
 
-    field->form.type = planned->type;
-    field->form.order = planned->order;
-    if (!node)
-        return 1;
-    field->scale_line = (int)yaml_file_line(node);
-    text = yaml_file_text(file, "scale", node, VALUE_LONGEST);
-    if (!text)
-        return 0;
-    if (planned->type == MBM_TYPE_BIT || planned->type == MBM_TYPE_TEXT)
-        return yaml_file_refuse(file, node, "a %s has no scale", value_type_names[planned->type]);
-    if (!value_scale_read(text, &field->form.scale))
-        return yaml_file_refuse(
-            file, node, "scale: \"%s\" is not a decimal number of up to 18 digits other than 0",
-            text);
-    return 1;
+    return device_values_read(file, &keys, shared, planned, field);
 }
 
 /* The words for a bit: that at an odd place is 1. */
@@ -296,7 +300,7 @@ static uint16_t read_one(yaml_file *file, const yaml_node_t *node, const value_f
     text = yaml_file_text(file, "value", node, VALUE_LONGEST);
     if (!text)
         return 0;
-    count = value_read(form, text, strlen(text), number, &wrong);
+    count = conversion_read(form, text, strlen(text), number, &wrong);
     if (count == 0)
         (void)yaml_file_refuse(file, node, "value: \"%s\" %s%s%s", text, wrong,
                                strstr(wrong, "range") ? " of " : "",
@@ -402,8 +406,12 @@ static int read_enumeration(yaml_file *file, const yaml_node_t *node, const mbm_
         return yaml_file_refuse(file, node,
                                 "a %s has no enumeration: only integers and bits have one",
                                 value_type_names[planned->type]);
-    if (field->form.scale.digits != 0)
+    if (field->form.scale.digits != 0 || field->power_name)
         return yaml_file_refuse(file, node, "a field with a scale has no enumeration");
+    if (field->conversion && field->conversion->offset.digits != 0)
+        return yaml_file_refuse(file, node, "a field with an offset has no enumeration");
+    if (field->conversion && field->conversion->has_precision)
+        return yaml_file_refuse(file, node, "a field with a precision has no enumeration");
     count = yaml_file_pairs(file, "enumeration", node, MOST_LABELS,
                             "numbers to names, such as {0: stopped, 1: running}");
     if (count == 0)
@@ -437,6 +445,22 @@ static int is_contradiction(const device *of, uint16_t one, uint16_t other)
     return 0;
 }
 
+/* Whether the value of a field goes with those of the fields before `end`. Returns 0 after a
+ * refusal. */
+static int check_value(yaml_file *file, const device *of, uint16_t field, uint16_t end)
+{
+    const device_field *fields = of->fields;
+    uint16_t i;
+
+    for (i = 0; i < end; i++)
+        if (i != field && is_contradiction(of, i, field))
+            return yaml_file_refuse_line(file, fields[field].line,
+                                         "%s shares an address with %s of line %d, and has another "
+                                         "value",
+                                         fields[field].name, fields[i].name, fields[i].line);
+    return 1;
+}
+
 /* Whether the last field goes with those before it. Returns 0 after a refusal. */
 static int check_others(yaml_file *file, const yaml_node_t *node, const device *of)
 {
@@ -444,15 +468,28 @@ static int check_others(yaml_file *file, const yaml_node_t *node, const device *
     const device_field *fields = of->fields;
     uint16_t i;
 
-    for (i = 0; i < last; i++) {
+    for (i = 0; i < last; i++)
         if (strcmp(fields[i].name, fields[last].name) == 0)
             return yaml_file_refuse(file, node, "the field in line %d has the name %s too",
                                     fields[i].line, fields[i].name);
-        if (is_contradiction(of, i, last))
-            return yaml_file_refuse(file, node,
-                                    "%s shares an address with %s of line %d, and has another "
-                                    "value",
-                                    fields[last].name, fields[i].name, fields[i].line);
+    return check_value(file, of, last, last);
+}
+
+/* Reads what waits until all fields are known: the values of fields whose power of ten another
+ * field has. Returns 0 after a refusal. */
+static int read_late(yaml_file *file, device *into)
+{
+    uint16_t i;
+
+    for (i = 0; i < into->count; i++) {
+        device_field *field = &into->fields[i];
+
+        if (field->power_name &&
+            (!device_values_find_power(file, into, i) ||
+             !read_value(file, (const yaml_node_t *)field->late_value, &into->planned[i], field) ||
+             !check_value(file, into, i, into->count)))
+            return 0;
+        field->late_value = NULL;
     }
     return 1;
 }
@@ -461,7 +498,16 @@ static int check_others(yaml_file *file, const yaml_node_t *node, const device *
 typedef struct head {
     mbm_planField planned;
     uint8_t write_function;
+    const yaml_node_t *not_available;
 } head;
+
+/* Reads the value of a field, or keeps it for read_late. */
+static int read_or_keep_value(yaml_file *file, const yaml_node_t *node,
+                              const mbm_planField *planned, device_field *field)
+{
+    field->late_value = field->power_name ? node : NULL;
+    return field->power_name || read_value(file, node, planned, field);
+}
 
 /* Makes space for another field. Returns 0 after a refusal. */
 static int grow(yaml_file *file, const yaml_node_t *node, device *into)
@@ -498,6 +544,7 @@ static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_
     field->write_function = shared->write_function;
     field->line = (int)yaml_file_line(node);
     *planned = shared->planned;
+    field->power_field = -1;
     into->count++;
     return device_repeat_name(file, values[NAME], DEVICE_NAME_BYTES, &field->name) &&
            yaml_file_copy(file, "unit_of_measurement", values[MEASURE], DEVICE_NAME_BYTES,
@@ -509,8 +556,8 @@ static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_
            read_shared(file, values[FIELD_UNIT], values[INTERVAL], values[ORDER], planned) &&
            read_access(file, values[ACCESS], planned, into->writes_masks, field) &&
            device_limits_check(file, node, values[WRITE_FUNCTION], into, planned, field) &&
-           read_scale(file, values[SCALE], planned, field) &&
-           read_value(file, values[VALUE], planned, field) &&
+           read_meaning(file, values, shared->not_available, planned, field) &&
+           read_or_keep_value(file, values[VALUE], planned, field) &&
            read_enumeration(file, values[ENUMERATION], planned, field) &&
            device_home_read(file, values[DEVICE_CLASS], values[STATE_CLASS], values[PRESS], planned,
                             field) &&
@@ -628,14 +675,16 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
         !yaml_file_copy(file, "device", values[DEVICE], DEVICE_NAME_BYTES, &into->name) ||
         !read_shared(file, values[DEVICE_UNIT], values[DEVICE_INTERVAL], values[DEVICE_ORDER],
                      &shared.planned) ||
+        !device_values_check_shared(file, values[DEVICE_NOT_AVAILABLE]) ||
         !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks) ||
         !device_address_read_notation(file, values[NOTATION], values[ONE_BASED], into) ||
         !device_limits_read_function(file, values[DEVICE_WRITE_FUNCTION], &shared.write_function) ||
         !device_limits_read(file, values + LIMITS, into))
         return 0;
     into->writes_masks = (uint8_t)writes_masks;
+    shared.not_available = values[DEVICE_NOT_AVAILABLE];
     return read_fields(file, values[FIELDS], &shared, into) && device_names_make(file, into) &&
-           sort_fields(file, into);
+           sort_fields(file, into) && read_late(file, into);
 }
 
 int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES])

@@ -91,33 +91,85 @@ uint8_t device_plan_try(mbm_plan *plan, const mbm_planSetup *setup, uint16_t *wr
 
 /* --- values --- */
 
-/* Writes one value of a field. Returns 0 if none has arrived yet. */
-static int print_one(const mbm_plan *plan, const device *of, uint16_t field, uint16_t index,
-                     int is_json, char text[VALUE_TEXT_BYTES])
+uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value_form *form)
+{
+    const int power = of->fields[field].power_field;
+    const mbm_planField *planned;
+    mbm_registers registers;
+    char text[VALUE_TEXT_BYTES];
+    long number;
+
+    *form = of->fields[field].form;
+    if (power < 0)
+        return MBM_OK;
+    planned = &of->planned[power];
+    /* A power that failed to arrive lately is not used for a number that did arrive: if one request
+     * reads both, they have one status. */
+    if (mbm_plan_getRegisters(plan, (uint16_t)power, &registers) != MBM_OK ||
+        (mbm_plan_getStatus(plan, (uint16_t)power, NULL) != MBM_OK &&
+         mbm_plan_getStatus(plan, field, NULL) == MBM_OK) ||
+        conversion_print(&of->fields[power].form, &registers, planned->address, 1, 0, text) !=
+            MBM_OK)
+        return MBM_NOT_AVAILABLE;
+    number = strtol(text, NULL, 10);
+    if (number < -DEVICE_POWER || number > DEVICE_POWER)
+        return MBM_NOT_AVAILABLE;
+    form->scale = conversion_power((int)number);
+    return MBM_OK;
+}
+
+/* Writes bits as one number. Returns as print_one. */
+static uint8_t print_bits(const mbm_planField *planned, const value_form *form, int64_t integer,
+                          int is_json, char text[VALUE_TEXT_BYTES])
+{
+    const int is_number = planned->count > 1 && device_is_part(planned);
+    value_form as = {.type = is_number ? MBM_TYPE_UINT16 : MBM_TYPE_BIT, .order = MBM_ORDER_ABCD};
+    uint16_t bits = (uint16_t)integer;
+    mbm_registers registers;
+
+    as.conversion = is_number ? form->conversion : NULL;
+    (void)mbm_registers_ofWords(&registers, &bits, 1, 0);
+    return conversion_print(&as, &registers, 0, 1, is_json, text);
+}
+
+/* Writes one value of a field. Returns MBM_OK; MBM_NOT_AVAILABLE with null in JSON, and else an
+ * empty text; MBM_PENDING if no value has arrived yet. */
+static uint8_t print_one(mbm_plan *plan, const device *of, uint16_t field, uint16_t index,
+                         int is_json, char text[VALUE_TEXT_BYTES])
 {
     const mbm_planField *planned = &of->planned[field];
     mbm_registers registers;
-    uint16_t bit, size;
+    value_form form;
+    uint16_t size;
     int64_t integer;
 
     if (planned->type == MBM_TYPE_BIT) {
         if (mbm_plan_getInteger(plan, field, index, &integer) != MBM_OK)
-            return 0;
-        if (planned->count > 1 && device_is_part(planned)) {
-            snprintf(text, VALUE_TEXT_BYTES, "%d", (int)integer);
-            return 1;
-        }
-        bit = (uint16_t)integer;
-        (void)mbm_registers_ofWords(&registers, &bit, 1, 0);
-        value_print(&of->fields[field].form, &registers, 0, 1, is_json, text);
-        return 1;
+            return MBM_PENDING;
+        return print_bits(planned, &of->fields[field].form, integer, is_json, text);
     }
     if (mbm_plan_getRegisters(plan, field, &registers) != MBM_OK)
-        return 0;
+        return MBM_PENDING;
+    if (device_plan_form(plan, of, field, &form) != MBM_OK) {
+        strcpy(text, is_json ? "null" : "");
+        return MBM_NOT_AVAILABLE;
+    }
     size = value_registers(planned->type, planned->count);
-    value_print(&of->fields[field].form, &registers, (uint16_t)(planned->address + index * size),
-                planned->count, is_json, text);
-    return 1;
+    return conversion_print(&form, &registers, (uint16_t)(planned->address + index * size),
+                            planned->count, is_json, text);
+}
+
+uint8_t device_plan_status(mbm_plan *plan, const device *of, uint16_t field, uint32_t *ageMs)
+{
+    const uint8_t status = mbm_plan_getStatus(plan, field, ageMs);
+    const uint16_t count = device_plan_count(&of->planned[field]);
+    char text[VALUE_TEXT_BYTES];
+    uint16_t index;
+
+    for (index = 0; status == MBM_OK && index < count; index++)
+        if (print_one(plan, of, field, index, 0, text) != MBM_NOT_AVAILABLE)
+            return status;
+    return status == MBM_OK ? MBM_NOT_AVAILABLE : status;
 }
 
 uint16_t device_plan_count(const mbm_planField *planned)
@@ -150,8 +202,8 @@ const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t fi
     return device_label_of(of, field, words);
 }
 
-int device_plan_text(const mbm_plan *plan, const device *of, uint16_t field, int is_json,
-                     char text[DEVICE_TEXT_LONGEST])
+int device_plan_text(mbm_plan *plan, const device *of, uint16_t field, int is_json,
+                     const char *none, char text[DEVICE_TEXT_LONGEST])
 {
     const uint16_t count = device_plan_count(&of->planned[field]);
     const int is_array = is_json && count > 1;
@@ -161,11 +213,12 @@ int device_plan_text(const mbm_plan *plan, const device *of, uint16_t field, int
     for (index = 0; index < count; index++) {
         const char *before = index > 0 ? "," : is_array ? "[" : "";
         char one[VALUE_TEXT_BYTES];
+        const uint8_t status = print_one(plan, of, field, index, is_json, one);
 
-        if (!print_one(plan, of, field, index, is_json, one))
+        if (status == MBM_PENDING)
             return 0;
-        length +=
-            (size_t)snprintf(text + length, DEVICE_TEXT_LONGEST - length, "%s%s", before, one);
+        length += (size_t)snprintf(text + length, DEVICE_TEXT_LONGEST - length, "%s%s", before,
+                                   status == MBM_NOT_AVAILABLE && !is_json ? none : one);
     }
     if (is_array)
         strcpy(text + length, "]");

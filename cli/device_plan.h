@@ -27,9 +27,18 @@ const char *device_plan_wrong(const device *of, const char *path, uint8_t status
 enum { DEVICE_TEXT_LONGEST = 16384 };
 
 /* Writes the value that the plan has of a field: plain, or as JSON if `is_json` is 1. Several
- * values are separated by commas, in JSON in an array. Returns 0 if no value has arrived yet. */
-int device_plan_text(const mbm_plan *plan, const device *of, uint16_t field, int is_json,
-                     char text[DEVICE_TEXT_LONGEST]);
+ * values are separated by commas, in JSON in an array. A value that is not available is null in
+ * JSON, and otherwise `none`. Returns 0 if no value has arrived yet. */
+int device_plan_text(mbm_plan *plan, const device *of, uint16_t field, int is_json,
+                     const char *none, char text[DEVICE_TEXT_LONGEST]);
+
+/* As mbm_plan_getStatus, and MBM_NOT_AVAILABLE if the last read has ended well, and none of the
+ * values of the field is available. `ageMs` may be NULL. */
+uint8_t device_plan_status(mbm_plan *plan, const device *of, uint16_t field, uint32_t *ageMs);
+
+/* Sets the form of a field's values as they are now: with the power of ten that another field has.
+ * Returns MBM_OK; MBM_NOT_AVAILABLE if that field has none. */
+uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value_form *form);
 
 /* How many values a field has: several numbers in a row or bits of a table; otherwise 1. */
 uint16_t device_plan_count(const mbm_planField *planned);

@@ -90,20 +90,44 @@ static void range_of(const mbm_planField *planned, double *least, double *most)
     }
 }
 
+static double or_less(double number, double other)
+{
+    return number < other ? number : other;
+}
+
+static double or_more(double number, double other)
+{
+    return number > other ? number : other;
+}
+
+/* Adds what a number may be: what its type holds, or the limits of the file. */
 static void add_range(cJSON *to, const device_field *field, const mbm_planField *planned)
 {
     const int is_float = planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE;
     const double scale = field->form.scale.digits != 0 ? field->form.scale.value : 1;
-    double least, most, step = is_float ? 0.001 : fabs(scale);
+    const conversion *of = field->conversion;
+    double least, most, other, step = is_float ? 0.001 : fabs(scale);
 
     range_of(planned, &least, &most);
-    least *= is_float ? 1 : scale;
-    most *= is_float ? 1 : scale;
+    /* The device may change a power of ten. */
+    other = field->power_name ? pow(10, DEVICE_POWER) : is_float ? 1 : scale;
+    least *= other;
+    most *= other;
     /* A negative scale turns the range. */
-    cJSON_AddNumberToObject(to, "min", least < most ? least : most);
-    cJSON_AddNumberToObject(to, "max", least < most ? most : least);
+    other = or_less(least, most);
+    most = or_more(least, most);
+    least = other;
+    if (field->power_name)
+        step = 0.001;
+    if (of) {
+        least = of->has_least ? of->least.value : least + of->offset.value;
+        most = of->has_most ? of->most.value : most + of->offset.value;
+        step = of->has_step ? of->step.value : step;
+    }
+    cJSON_AddNumberToObject(to, "min", least);
+    cJSON_AddNumberToObject(to, "max", most);
     /* Home Assistant has no smaller step. */
-    cJSON_AddNumberToObject(to, "step", step < 0.001 ? 0.001 : step);
+    cJSON_AddNumberToObject(to, "step", or_more(step, 0.001));
     cJSON_AddStringToObject(to, "mode", "box");
 }
 
@@ -247,6 +271,9 @@ static void add_class(cJSON *to, const device_field *one, const mbm_planField *p
     else if (one->unit_of_measurement && home_is_number(one, planned) &&
              (component == HOME_SENSOR || component == HOME_NUMBER))
         cJSON_AddStringToObject(to, "unit_of_measurement", one->unit_of_measurement);
+    if (component == HOME_SENSOR && home_is_number(one, planned) && one->conversion &&
+        one->conversion->has_precision)
+        cJSON_AddNumberToObject(to, "suggested_display_precision", one->conversion->precision);
 }
 
 /* Adds what a button sends: the value, of a text as a JSON string. */

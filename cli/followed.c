@@ -127,7 +127,7 @@ static int read_number(const followed *f, uint16_t field, long double *number,
     char *end;
 
     if (meter->fields[field].label_count > 0 ||
-        !device_plan_text(&f->of->plan, meter, field, 1, value) ||
+        !device_plan_text(&f->of->plan, meter, field, 1, "", value) ||
         !strchr("-0123456789", value[0]) || strlen(value) >= FOLLOWED_NUMBER_BYTES)
         return 0;
     *number = strtold(value, &end);

@@ -251,13 +251,14 @@ static void reduce(uint64_t *one, uint64_t *other)
 }
 
 /* Finds the multiplier and the divisor that are exactly a scale. Returns 0 if they do not fit. */
-static int find_scale(const value_scale *scale, header_scale *found)
+static int find_scale(const device_field *field, header_scale *found)
 {
+    const value_scale *scale = &field->form.scale;
     uint64_t multiplier = scale->digits, divisor = 1;
     long exponent = scale->exponent;
 
     found->multiplier = found->divisor = 1;
-    if (multiplier == 0)
+    if (!header_is_scaled(field))
         return 1;
     for (; exponent > 0; exponent--) {
         if (multiplier > INT32_MAX)
@@ -286,7 +287,7 @@ static int find_scales(header *h)
     if (!h->scales)
         return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     for (i = 0; i < h->of->count; i++)
-        if (!find_scale(&h->of->fields[i].form.scale, &h->scales[i]))
+        if (!find_scale(&h->of->fields[i], &h->scales[i]))
             return report(
                 CODE_WRONG,
                 "%s:%d: scale is not a fraction of two whole numbers up to 2147483647, as "
@@ -378,7 +379,7 @@ static void scale_fields(const header *h, mbm_planField *fields)
 
     for (i = 0; i < h->of->readable; i++) {
         fields[i] = h->of->planned[i];
-        if (h->scales && h->of->fields[i].form.scale.digits) {
+        if (h->scales && header_is_scaled(&h->of->fields[i])) {
             fields[i].multiplier = h->scales[i].multiplier;
             fields[i].divisor = h->scales[i].divisor;
         }

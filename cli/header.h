@@ -57,6 +57,19 @@ void header_place(const header *h, const mbm_planField *planned);
 /* The C type of a field's value; that of a bit is uint8_t. */
 const char *header_type(const mbm_planField *planned);
 
+/* Whether a field has a scale that is a number; whether it has limits of what is written. */
+int header_is_scaled(const device_field *field);
+int header_has_limits(const device_field *field);
+
+/* Write the limits of a field in words; and its power of ten and its offset, if it has them:
+ * "times 10^(power_sf), plus -40", between `before` and `after`. */
+void header_write_limits(FILE *out, const device_field *field);
+void header_write_meaning(FILE *out, const device_field *field, const char *before,
+                          const char *after);
+
+/* Writes the conversions of a plan's fields. Returns 0 after reporting a refusal. */
+int header_write_conversions(header *h);
+
 /* Write a part of the header. They return 0 after reporting a refusal. */
 int header_write_fields(header *h);
 int header_write_plan(header *h);

@@ -180,16 +180,22 @@ static void write_what_it_is(header *h, uint16_t at)
     if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
         fprintf(h->out, ", order %s", value_order_names[planned->order]);
     fprintf(h->out, "; %s.", ACCESSES[field->access]);
-    if (field->form.scale.digits || field->unit_of_measurement) {
+    if (header_is_scaled(field) || field->unit_of_measurement) {
         fprintf(h->out, "\n * In ");
-        if (field->form.scale.digits)
+        if (header_is_scaled(field))
             fprintf(h->out, "%" PRId32, scale->multiplier);
         if (scale->divisor != 1)
             fprintf(h->out, "/%" PRId32, scale->divisor);
-        if (field->form.scale.digits && field->unit_of_measurement)
+        if (header_is_scaled(field) && field->unit_of_measurement)
             fputc(' ', h->out);
         if (field->unit_of_measurement)
             header_comment(h->out, field->unit_of_measurement);
+        fputc('.', h->out);
+    }
+    header_write_meaning(h->out, field, "\n * Then ", ".");
+    if (header_has_limits(field)) {
+        fprintf(h->out, "\n * What is written is ");
+        header_write_limits(h->out, field);
         fputc('.', h->out);
     }
     if (field->description) {
@@ -214,7 +220,7 @@ static int write_field(header *h, uint16_t at)
         (device_is_part(planned) && (!write_macro(h, at, "_BIT", planned->bit) ||
                                      !write_macro(h, at, "_BITS", planned->count))))
         return 0;
-    if (field->form.scale.digits) {
+    if (header_is_scaled(field)) {
         fprintf(h->out, "#define %s_%s_MULTIPLIER ", h->upper, h->fields[at]);
         fprintf(h->out, scale->multiplier < 0 ? "(%" PRId32 ")\n" : "%" PRId32 "\n",
                 scale->multiplier);
@@ -224,6 +230,9 @@ static int write_field(header *h, uint16_t at)
             !header_define(h, at, "_DIVISOR", field->line))
             return 0;
     }
+    if (field->conversion && field->conversion->has_precision &&
+        !write_macro(h, at, "_PRECISION", field->conversion->precision))
+        return 0;
     return write_labels(h, at);
 }
 
@@ -253,7 +262,7 @@ static void write_row(header *h, uint16_t at, int is_last)
                                         "UINT64", "INT64", "FLOAT",  "DOUBLE", "TEXT"};
     const mbm_planField *planned = &h->of->planned[at];
     const header_scale *scale = &h->scales[at];
-    const int is_scaled = h->of->fields[at].form.scale.digits != 0;
+    const int is_scaled = header_is_scaled(&h->of->fields[at]);
 
     fprintf(h->out, "    /* %s_%s */\n", h->upper, h->fields[at]);
     fprintf(h->out,
@@ -297,7 +306,10 @@ int header_write_plan(header *h)
             h->lower, h->upper);
     for (i = 0; i < h->reads; i++)
         fprintf(h->out, "%s%uu", i == 0 ? "" : i % 16 == 0 ? ",\n    " : ", ", h->counts[i]);
-    fprintf(h->out, "};\n#endif\n");
+    fprintf(h->out, "};\n");
+    if (!header_write_conversions(h))
+        return 0;
+    fprintf(h->out, "#endif\n");
     return 1;
 }
 
@@ -358,14 +370,20 @@ static void write_page_row(const header *h, uint16_t at)
     if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
         fprintf(h->out, ", %s", value_order_names[planned->order]);
     fprintf(h->out, " | ");
-    if (field->form.scale.digits && scale->divisor != 1)
+    if (header_is_scaled(field) && scale->divisor != 1)
         fprintf(h->out, "%" PRId32 "/%" PRId32, scale->multiplier, scale->divisor);
-    else if (field->form.scale.digits)
+    else if (header_is_scaled(field))
         fprintf(h->out, "%" PRId32, scale->multiplier);
+    header_write_meaning(h->out, field, header_is_scaled(field) ? ", " : "", "");
     fprintf(h->out, " | ");
     if (field->unit_of_measurement)
         write_text(h->out, field->unit_of_measurement);
-    fprintf(h->out, " | %s | ", PAGE_ACCESSES[field->access]);
+    fprintf(h->out, " | %s", PAGE_ACCESSES[field->access]);
+    if (header_has_limits(field)) {
+        fputs(": ", h->out);
+        header_write_limits(h->out, field);
+    }
+    fputs(" | ", h->out);
     write_meaning(h, at);
     fprintf(h->out, " |\n");
 }

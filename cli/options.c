@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "options.h"
 
+#include "decimal.h"
 #include "advice.h"
 #include "mbm.h"
 #include "numbers.h"
@@ -25,6 +26,7 @@ enum {
     REPLACE_AFTER,
     JSON,
     SCALE,
+    OFFSET,
     HEX,
     ONE_BASED
 };
@@ -272,6 +274,10 @@ static void fit_type(const struct argp_state *state)
         (options.form.type == MBM_TYPE_TEXT || options.form.type == MBM_TYPE_BIT ||
          options.form.is_hex))
         options_wrong(state, "--scale needs a number, not a bit, a text or --hex");
+    if (options.conversion.offset.digits != 0 &&
+        (options.form.type == MBM_TYPE_TEXT || options.form.type == MBM_TYPE_BIT ||
+         options.form.is_hex))
+        options_wrong(state, "--offset needs a number, not a bit, a text or --hex");
     if (options.form.is_hex && options.form.type >= MBM_TYPE_FLOAT)
         options_wrong(state, "--hex needs an integer type");
 }
@@ -296,6 +302,12 @@ static error_t parse_values(int key, char *text, struct argp_state *state)
             options_wrong(state, "--scale \"%s\" is not a decimal number other than 0, such as 0.1",
                           text);
         return 0;
+    case OFFSET:
+        if (!decimal_read_short(text, &options.conversion.offset))
+            options_wrong(state, "--offset \"%s\" is not a decimal number of up to 18 digits",
+                          text);
+        options.form.conversion = &options.conversion;
+        return 0;
     case HEX: options.form.is_hex = 1; return 0;
     case ONE_BASED: options.is_one_based = 1; return 0;
     case ARGP_KEY_END: fit_type(state); return 0;
@@ -313,6 +325,7 @@ static const struct argp_option value_texts[] = {
      "Order of the bytes of a value: ABCD, CDAB, BADC or DCBA; A is the most significant one (ABCD)",
      1},
     {"scale", SCALE, "NUMBER", 0, "The value is the device's number times this, such as 0.1", 1},
+    {"offset", OFFSET, "NUMBER", 0, "This is added to it, after the scale, such as -273.15", 1},
     {"hex", HEX, NULL, 0, "Values of integer types are hexadecimal", 1},
     {"one-based", ONE_BASED, NULL, 0, "ADDRESS counts from 1, as in many manuals", 1},
     {0}};

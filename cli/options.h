@@ -7,6 +7,7 @@
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
+#include "conversion.h"
 #include "value.h"
 
 #include <argp.h>
@@ -25,6 +26,7 @@ typedef struct client_options {
     /* of options_values */
     uint8_t table; /* one of MBM_TABLE_ */
     value_form form;
+    conversion conversion; /* of `form` */
     uint8_t has_type, is_one_based;
 } client_options;
 
@@ -41,8 +43,8 @@ extern const struct argp options_output;
 extern const struct argp options_client;
 /* --unit. */
 extern const struct argp options_unit;
-/* --table, --type, --order, --scale, --hex, --one-based. At the end of the command line the type is
- * that of the table: a bit, or a uint16 if none is given. */
+/* --table, --type, --order, --scale, --offset, --hex, --one-based. At the end of the command line
+ * the type is that of the table: a bit, or a uint16 if none is given. */
 extern const struct argp options_values;
 
 /* Read a text of the command line; `what` names it, for example "COUNT". If the text is not right,

@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "payload.h"
 
+#include "conversion.h"
 #include "numbers.h"
 
 #include <stdio.h>
@@ -155,9 +156,9 @@ static int read_truth(cursor value)
 uint16_t payload_parse(const value_form *form, const char *payload, size_t length,
                        uint16_t words[VALUE_WORDS], const char **wrong)
 {
-    static char reason[80];
+    static char reason[160];
     cursor value, in;
-    uint16_t count;
+    uint16_t count = 0;
 
     *wrong = length > PAYLOAD_BYTES ? "the payload is too long" : NULL;
     if (*wrong)
@@ -171,7 +172,9 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
         *wrong = "the payload is no number";
         return 0;
     }
-    count = value_read(form, value.at, (size_t)(value.end - value.at), words, wrong);
+    *wrong = conversion_check(form, value.at, (size_t)(value.end - value.at));
+    if (!*wrong)
+        count = conversion_read(form, value.at, (size_t)(value.end - value.at), words, wrong);
     if (count == 0) {
         snprintf(reason, sizeof reason, "the number %s", *wrong);
         *wrong = reason;
@@ -270,7 +273,7 @@ static const char *read_text(const value_form *form, uint16_t count, const char 
 static const char *read_values(const value_form *form, uint16_t count, const char *payload,
                                size_t length, uint16_t *words)
 {
-    static char reason[100];
+    static char reason[200];
     cursor in = find_value(payload, length);
     const char *wrong = NULL;
     uint16_t at;

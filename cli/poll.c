@@ -199,7 +199,7 @@ static void print_row(polling *p, uint16_t field, int name_width)
     char status[256], age[32] = "";
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&p->read.plan, field, &ageMs);
+    const uint8_t code = device_plan_status(&p->read.plan, &p->read.meter, field, &ageMs);
 
     (void)polled_value(&p->read, field, value);
     if (ageMs != UINT32_MAX)

@@ -45,10 +45,13 @@ int polled_value(polled *p, uint16_t field, char text[POLLED_VALUE_BYTES])
 {
     const char *measure = p->meter.fields[field].unit_of_measurement;
 
-    if (!device_plan_text(&p->plan, &p->meter, field, 0, text)) {
+    if (!device_plan_text(&p->plan, &p->meter, field, 0, "-", text)) {
         strcpy(text, "-");
         return 0;
     }
+    /* A value that is not available has no unit. */
+    if (text[strspn(text, "-,")] == '\0')
+        return 1;
     if (measure)
         snprintf(text + strlen(text), DEVICE_NAME_BYTES + 2, " %s", measure);
     add_names(p, field, text, POLLED_VALUE_BYTES);
@@ -79,11 +82,11 @@ void polled_add_json(polled *p, uint16_t field, cJSON *object)
     char status[256];
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&p->plan, field, &ageMs);
+    const uint8_t code = device_plan_status(&p->plan, &p->meter, field, &ageMs);
 
     cJSON_AddNumberToObject(object, "unit", p->meter.planned[field].unit);
     cJSON_AddStringToObject(object, "name", of->name);
-    if (device_plan_text(&p->plan, &p->meter, field, 1, value))
+    if (device_plan_text(&p->plan, &p->meter, field, 1, "", value))
         cJSON_AddRawToObject(object, "value", value);
     else
         cJSON_AddNullToObject(object, "value");

@@ -22,7 +22,8 @@ uint8_t polled_exception(uint8_t status);
 const char *polled_status(polled *p, uint8_t status, char text[256]);
 
 /* Writes the value of a field with its unit of measurement and the names of its enumeration: "230.1
- * V", "4 (MPPT)". Returns 0 if none has arrived yet; it is "-" then. */
+ * V", "4 (MPPT)". A value that is not available is "-". Returns 0 if none has arrived yet; it is
+ * "-" then. */
 enum { POLLED_VALUE_BYTES = DEVICE_TEXT_LONGEST + 3 * DEVICE_NAME_BYTES };
 int polled_value(polled *p, uint16_t field, char text[POLLED_VALUE_BYTES]);
 

@@ -32,6 +32,7 @@ typedef struct reading {
     const char *address_text, *count_text;
     uint32_t intervalMs, rounds;
     int is_csv;
+    const char *not_available;
 
     /* The units, which are read one after another; `turn` is the index of the one at work. */
     uint8_t units[OPTIONS_UNITS];
@@ -48,7 +49,41 @@ typedef struct reading {
 
 /* --- the command line --- */
 
-enum { EVERY = 1, TIMES, CSV };
+enum { EVERY = 1, TIMES, CSV, PRECISION, NOT_AVAILABLE };
+
+/* Reads a list such as 0x8000,0xFFFF or "standard". */
+static void read_not_available(const reading *r, const struct argp_state *state)
+{
+    static uint16_t numbers[CONVERSION_NUMBERS][VALUE_WORDS];
+    conversion *of = &options.conversion;
+    const char *text = r->not_available, *wrong;
+    char one[VALUE_LONGEST + 1];
+
+    if (options.form.type == MBM_TYPE_BIT)
+        options_wrong(state, "--not-available needs a number or a text, not a bit");
+    of->numbers = numbers;
+    options.form.conversion = of;
+    for (;;) {
+        const size_t length = strcspn(text, ",");
+
+        if (length > VALUE_LONGEST || of->number_count == CONVERSION_NUMBERS)
+            options_wrong(state, "--not-available \"%s\" is too long", r->not_available);
+        memcpy(one, text, length);
+        one[length] = '\0';
+        wrong = NULL;
+        if (strcmp(one, "standard") == 0)
+            of->is_standard = 1;
+        else
+            wrong = options.form.type == MBM_TYPE_TEXT
+                        ? "is not \"standard\", which is all that a text has"
+                        : conversion_add(of, &options.form, one);
+        if (wrong)
+            options_wrong(state, "--not-available: \"%s\" %s", one, wrong);
+        if (text[length] == '\0')
+            return;
+        text += length + 1;
+    }
+}
 
 static void check_arguments(reading *r, const struct argp_state *state)
 {
@@ -66,6 +101,10 @@ static void check_arguments(reading *r, const struct argp_state *state)
         options_wrong(state, "--times needs --every");
     if (r->is_csv && options.is_json)
         options_wrong(state, "--csv and --json exclude each other");
+    if (options.conversion.has_precision && (is_text || is_bits || options.form.is_hex))
+        options_wrong(state, "--precision needs a number, not a bit, a text or --hex");
+    if (r->not_available)
+        read_not_available(r, state);
     r->each = value_registers(options.form.type, is_text ? (uint16_t)r->count : 1);
     r->total = is_text ? r->each : r->count * r->each;
     if (r->address + r->total > ADDRESSES)
@@ -94,6 +133,13 @@ static error_t parse(int key, char *text, struct argp_state *state)
         r->rounds = (uint32_t)options_number(state, "--times", text, 1, 1000000000);
         return 0;
     case CSV: r->is_csv = 1; return 0;
+    case PRECISION:
+        options.conversion.precision =
+            (uint8_t)options_number(state, "--precision", text, 0, CONVERSION_PLACES);
+        options.conversion.has_precision = 1;
+        options.form.conversion = &options.conversion;
+        return 0;
+    case NOT_AVAILABLE: r->not_available = text; return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num == 0)
             options_place(state, &r->where, text, 0);
@@ -113,6 +159,11 @@ static const struct argp_option texts[] = {
     {"unit", 'u', "LIST", 0, "The unit ids to read, 1 to 255, such as 17 or 1,17,30-39 (1)", 1},
     {"every", EVERY, "TIME", 0, "Read again and again, such as every 500ms or 2s, until Ctrl-C", 0},
     {"times", TIMES, "N", 0, "With --every: so many times", 0},
+    {"precision", PRECISION, "N", 0, "Show N digits after the point, 0 to 18", 1},
+    {"not-available", NOT_AVAILABLE, "LIST", 0,
+     "Numbers of the registers that mean \"not available\", such as 0x8000,0xFFFF, or standard: those "
+     "of SunSpec",
+     1},
     {"csv", CSV, NULL, 0, "Print CSV, one line a round", 3},
     {0}};
 
@@ -220,13 +271,31 @@ static part *first_failed(reading *r)
 
 /* --- showing --- */
 
-static void print_value(reading *r, uint32_t value, int is_json, char text[VALUE_TEXT_BYTES])
+/* Returns MBM_OK; MBM_NOT_AVAILABLE with null in JSON, and else an empty text. */
+static uint8_t print_value(reading *r, uint32_t value, int is_json, char text[VALUE_TEXT_BYTES])
 {
     const uint16_t first = (uint16_t)(r->address + value * r->each);
     mbm_registers registers;
 
     (void)mbm_registers_ofWords(&registers, r->words + value * r->each, r->each, first);
-    value_print(&options.form, &registers, first, (uint16_t)(r->each * 2), is_json, text);
+    return conversion_print(&options.form, &registers, first, (uint16_t)(r->each * 2), is_json,
+                            text);
+}
+
+/* The status of all parts, in words. It is that of the first that failed; "not available" if all
+ * were read, and have no value. Returns `status`. */
+static const char *status_of_all(reading *r, char status[256])
+{
+    const part *failed = first_failed(r);
+    char text[VALUE_TEXT_BYTES];
+    uint32_t value;
+
+    for (value = 0; !failed && value < r->count; value++)
+        if (print_value(r, value, 0, text) == MBM_OK)
+            break;
+    if (!failed && value == r->count)
+        return mbm_status_text(MBM_NOT_AVAILABLE);
+    return line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status);
 }
 
 static unsigned shown_address(reading *r, uint32_t offset)
@@ -254,7 +323,8 @@ static void print_rows(reading *r, int is_table)
         }
         is_changed = old->has_part[p - r->parts] && memcmp(r->words + first, old->words + first,
                                                            r->each * sizeof r->words[0]) != 0;
-        print_value(r, value, 0, text);
+        if (print_value(r, value, 0, text) == MBM_NOT_AVAILABLE)
+            strcpy(text, mbm_status_text(MBM_NOT_AVAILABLE));
         printf("%s%5u  %s\n",
                !is_table    ? ""
                : is_changed ? "* "
@@ -308,15 +378,14 @@ static void print_csv_head(reading *r)
 static void print_csv(reading *r, const char *time)
 {
     char text[VALUE_TEXT_BYTES], status[256];
-    const part *failed = first_failed(r);
     uint32_t value;
 
     printf("%s,%u", time, options.unit);
-    print_cell(line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status));
+    print_cell(status_of_all(r, status));
     for (value = 0; value < r->count; value++) {
         *text = '\0';
         if (is_read(r, value))
-            print_value(r, value, 0, text);
+            (void)print_value(r, value, 0, text);
         print_cell(text);
     }
     putchar('\n');
@@ -336,9 +405,7 @@ static void print_json(reading *r, const char *time)
     cJSON_AddNumberToObject(
         all, "code",
         failed ? report_code_of(failed->request.status, failed->request.exception) : 0);
-    cJSON_AddStringToObject(
-        all, "status",
-        line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status));
+    cJSON_AddStringToObject(all, "status", status_of_all(r, status));
     values = cJSON_AddArrayToObject(all, "values");
     for (value = 0; value < r->count; value++) {
         const part *p = part_of(r, value);
@@ -350,8 +417,11 @@ static void print_json(reading *r, const char *time)
         cJSON_AddItemToArray(values, one);
         cJSON_AddNumberToObject(one, "address", shown_address(r, value * r->each));
         if (is_read(r, value)) {
-            print_value(r, value, 1, text);
+            const uint8_t code = print_value(r, value, 1, text);
+
             cJSON_AddRawToObject(one, "value", text);
+            if (code != MBM_OK)
+                cJSON_AddStringToObject(one, "status", mbm_status_text(code));
         } else {
             cJSON_AddNumberToObject(one, "count", (double)p->quantity / r->each);
             cJSON_AddStringToObject(one, "status", line_status(&r->at, &p->request, status));

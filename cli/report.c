@@ -138,7 +138,8 @@ int report_code_of(uint8_t status, uint8_t exception)
     if (exception != 0)
         return CODE_EXCEPTION;
     switch (status) {
-    case MBM_OK: return CODE_DONE;
+    case MBM_OK:
+    case MBM_NOT_AVAILABLE: return CODE_DONE;
     case MBM_LINK_LOST:
     case MBM_CONNECT_TIMED_OUT:
     case MBM_LINE_BUSY: return CODE_LINE;

@@ -3,6 +3,8 @@
  * Licence: MIT OR Apache-2.0. */
 #include "served.h"
 
+#include "served_limits.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -124,12 +126,14 @@ static int has_function(const served_cells *cells, const mbm_access *access)
 static uint8_t before_write(void *context, const mbm_access *access)
 {
     const served_cells *cells = (const served_cells *)context;
+    uint8_t exception;
 
     if (!has_function(cells, access))
         return MBM_ILLEGAL_FUNCTION;
     if (cells->most_written > 0 && access->quantity > cells->most_written)
         return MBM_ILLEGAL_DATA_VALUE;
-    return check(cells->writable, access);
+    exception = check(cells->writable, access);
+    return exception ? exception : served_limits_check(cells, access);
 }
 
 /* Makes the cells of a table. Returns 0, or -1 without memory. */
@@ -139,6 +143,9 @@ static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum ser
     served_cells *cells = &units->cells[unit][table - 1];
 
     cells->kind = kind;
+    cells->owner = units;
+    cells->unit = (uint8_t)units->units[unit].id;
+    cells->table = table;
     cells->seed = (uint32_t)(units->units[unit].id * 4 + table) * 40503u;
     cells->random = cells->seed | 1;
     cells->callbacks.context = cells->hooks.context = cells;
@@ -261,6 +268,7 @@ int served_make_device(served_units *units, const device *from, served_hook *hoo
             ids[count++] = (uint8_t)i;
     if (begin(units, SERVED_DEVICE, ids, count, from->name, hook) != 0)
         return -1;
+    units->from = from;
     for (i = 0; i < count; i++)
         for (table = MBM_TABLE_COILS; table <= MBM_TABLE_INPUT_REGISTERS; table++) {
             const int is_bits = table <= MBM_TABLE_DISCRETE_INPUTS;

@@ -14,6 +14,8 @@ typedef struct served_cells {
     mbm_dataCallbacks callbacks;
     mbm_accessHooks hooks;
     enum served_kind kind;
+    const struct served_units *owner;
+    uint8_t unit, table;
     uint32_t seed, random;
     uint16_t *values;
     /* One bit for each address. Only cells of a device may be neither readable nor writable.
@@ -35,13 +37,14 @@ typedef struct served_units {
     mbm_unit *units;
     uint8_t count;
     served_cells (*cells)[4]; /* the tables of each unit */
+    const device *from;       /* NULL unless the units are those of a device */
     mbm_custom every_request;
     mbm_serverIdentification identification;
     mbm_object objects[3];
 } served_units;
 
-/* Makes the units of a device in the order of their ids, or `count` units with these ids. `hook`
- * must outlive them. Returns 0, or -1 without memory. */
+/* Makes the units of a device in the order of their ids, or `count` units with these ids. `from`
+ * and `hook` must outlive them. Returns 0, or -1 without memory. */
 int served_make_device(served_units *units, const device *from, served_hook *hook);
 int served_make_units(served_units *units, enum served_kind kind, const uint8_t *ids, uint8_t count,
                       served_hook *hook);

@@ -24,12 +24,15 @@ typedef struct value_scale {
     uint8_t is_negative;
 } value_scale;
 
+struct conversion;
+
 /* How registers stand for a value. */
 typedef struct value_form {
     uint8_t type;  /* one of MBM_TYPE_ */
     uint8_t order; /* one of MBM_ORDER_ */
     uint8_t is_hex;
     value_scale scale;
+    const struct conversion *conversion; /* for the functions of conversion.h; NULL for none */
 } value_form;
 
 /* The names of tables, types and orders, each at its number in mbm.h; the first is no name, and

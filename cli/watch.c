@@ -190,7 +190,7 @@ static void draw_field(watch *w, drawing *d, uint16_t field)
     char status[256], age[24] = "", changed[24] = "", unit[8];
     uint32_t ageMs;
 
-    const uint8_t code = mbm_plan_getStatus(&of->plan, field, &ageMs);
+    const uint8_t code = device_plan_status(&of->plan, &of->meter, field, &ageMs);
     const int is_wrong =
         code != MBM_PENDING && report_code_of(code, polled_exception(code)) != CODE_DONE;
 

@@ -50,7 +50,7 @@ static void read_number(writing *w, const struct argp_state *state, const char *
 {
     const char *wrong;
     const uint16_t added =
-        value_read(&options.form, text, strlen(text), w->words + w->total, &wrong);
+        conversion_read(&options.form, text, strlen(text), w->words + w->total, &wrong);
 
     if (added == 0 && options.form.type == MBM_TYPE_BIT)
         options_wrong(state, "VALUE \"%s\" is no value of a coil: 1 is on, and 0 is off", text);

@@ -220,7 +220,7 @@ PLACE = "rtu:/dev/null"
     (RIGHT.replace("uint16", "word"), 'type: "word" is not one of bit, uint16'),
     (RIGHT.replace("100ms", "0ms"), 'interval: "0ms" is out of range: from 1ms to 24h'),
     (RIGHT.replace("100ms", "100"), 'interval: "100" is not a time'),
-    (f"{RIGHT}, scale: x", 'scale: "x" is not a decimal number'),
+    (f"{RIGHT}, scale: x", 'scale: "x" is neither a decimal number'),
     (f"{RIGHT}, scale: 0x10", 'scale: "0x10" is not a decimal number'),
     (RIGHT.replace("voltage", "v" * 201), "name has more than 200 bytes"),
     (f"{RIGHT}, big: 1", 'key: "big" is not one of name, table'),

@@ -1,0 +1,359 @@
+/* Reads what the numbers of a field mean, and refuses what its type cannot have.
+ *
+ * Licence: MIT OR Apache-2.0. */
+#include "device_values.h"
+
+#include "conversion.h"
+#include "decimal.h"
+#include "device_repeat.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char STANDARD[] = "standard", NONE[] = "none";
+
+/* What not_available may be, for refusals. */
+#define NUMBERS_OR_WORDS "a number such as 0x8000 or -1, \"standard\", a list of these, or \"none\""
+
+/* Gives a field a conversion unless it has one. Returns 0 without memory. */
+static int make_conversion(yaml_file *file, device_field *field)
+{
+    if (!field->conversion)
+        field->conversion = (conversion *)calloc(1, sizeof *field->conversion);
+    field->form.conversion = field->conversion;
+    return field->conversion != NULL || yaml_file_fail(file, ENOMEM);
+}
+
+/* --- scale and offset --- */
+
+static int is_bit(const mbm_planField *planned)
+{
+    return planned->type == MBM_TYPE_BIT;
+}
+
+/* A text or bits have none of the keys that calculate. */
+static int check_number(yaml_file *file, const char *key, const yaml_node_t *node,
+                        const mbm_planField *planned)
+{
+    return (!is_bit(planned) && planned->type != MBM_TYPE_TEXT) ||
+           yaml_file_refuse(file, node, "a %s has no %s", value_type_names[planned->type], key);
+}
+
+/* Whether a text is meant to be a number. */
+static int looks_like_number(const char *text)
+{
+    return text[strspn(text, "0123456789+-.,eE")] == '\0' || text[0] == '-' || text[0] == '.' ||
+           strncmp(text, "0x", 2) == 0;
+}
+
+static int read_scale(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
+                      device_field *field)
+{
+    const char *text;
+
+    field->form.type = planned->type;
+    field->form.order = planned->order;
+    if (!node)
+        return 1;
+    field->scale_line = (int)yaml_file_line(node);
+    text = yaml_file_text(file, "scale", node, DEVICE_NAME_BYTES);
+    if (!text || !check_number(file, "scale", node, planned))
+        return 0;
+    if (strlen(text) <= VALUE_LONGEST && value_scale_read(text, &field->form.scale))
+        return 1;
+    if (looks_like_number(text))
+        return yaml_file_refuse(
+            file, node, "scale: \"%s\" is not a decimal number of up to 18 digits other than 0",
+            text);
+    return device_repeat_name(file, node, DEVICE_NAME_BYTES, &field->power_name) &&
+           yaml_file_copy(file, "scale", node, DEVICE_NAME_BYTES, &field->power_plain);
+}
+
+static int read_offset(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
+                       device_field *field)
+{
+    const char *text;
+
+    if (!node)
+        return 1;
+    text = yaml_file_text(file, "offset", node, VALUE_LONGEST);
+    if (!text || !check_number(file, "offset", node, planned) || !make_conversion(file, field))
+        return 0;
+    return decimal_read_short(text, &field->conversion->offset) ||
+           yaml_file_refuse(file, node, "offset: \"%s\" is not a decimal number of up to 18 digits",
+                            text);
+}
+
+static int read_precision(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
+                          device_field *field)
+{
+    uint32_t places = 0;
+
+    if (!node)
+        return 1;
+    if (!check_number(file, "precision", node, planned) || !make_conversion(file, field) ||
+        !yaml_file_number(file, "precision", node, 0, CONVERSION_PLACES, &places))
+        return 0;
+    field->conversion->has_precision = 1;
+    field->conversion->precision = (uint8_t)places;
+    return 1;
+}
+
+/* --- limits --- */
+
+static int read_limit(yaml_file *file, const char *key, const yaml_node_t *node,
+                      const mbm_planField *planned, device_field *field, value_scale *limit)
+{
+    const char *text;
+
+    if (planned->type == MBM_TYPE_TEXT || (is_bit(planned) && planned->count == 1) ||
+        planned->table <= MBM_TABLE_DISCRETE_INPUTS)
+        return yaml_file_refuse(file, node, "a %s has no %s", value_type_names[planned->type], key);
+    if (!(field->access & DEVICE_WRITE))
+        return yaml_file_refuse(file, node,
+                                "%s is for what is written, and the field cannot be written: a "
+                                "value that is read is shown as it is",
+                                key);
+    text = yaml_file_text(file, key, node, VALUE_LONGEST);
+    if (!text)
+        return 0;
+    return decimal_read_short(text, limit) ||
+           yaml_file_refuse(file, node, "%s: \"%s\" is not a decimal number of up to 18 digits",
+                            key, text);
+}
+
+static int read_limits(yaml_file *file, const device_values *values, const mbm_planField *planned,
+                       device_field *field)
+{
+    static decimal_number least;
+    conversion *of;
+
+    if (!values->least && !values->most && !values->step)
+        return 1;
+    if (!make_conversion(file, field))
+        return 0;
+    of = field->conversion;
+    of->has_least = values->least != NULL;
+    of->has_most = values->most != NULL;
+    of->has_step = values->step != NULL;
+    if ((of->has_least &&
+         !read_limit(file, "min_value", values->least, planned, field, &of->least)) ||
+        (of->has_most && !read_limit(file, "max_value", values->most, planned, field, &of->most)) ||
+        (of->has_step && !read_limit(file, "step", values->step, planned, field, &of->step)))
+        return 0;
+    decimal_of_scale(&of->least, &least);
+    if (of->has_least && of->has_most && decimal_compare(&least, &of->most) > 0)
+        return yaml_file_refuse(file, values->least, "min_value is greater than max_value");
+    if (of->has_step && (of->step.digits == 0 || of->step.is_negative))
+        return yaml_file_refuse(file, values->step, "step must be greater than 0");
+    return 1;
+}
+
+/* --- not available --- */
+
+/* How many digits a hexadecimal number of a type has. */
+static size_t hex_digits(const mbm_planField *planned, const device_field *field)
+{
+    return (size_t)4 * value_registers(is_bit(planned) ? MBM_TYPE_UINT16 : field->form.type, 1);
+}
+
+/* Adds a number. One of the head of the file counts for the types that it fits: one in hexadecimal
+ * for those that have as many digits, and another one for those whose range it is in. */
+static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
+                      const mbm_planField *planned, device_field *field)
+{
+    const char *text = yaml_file_text(file, "not_available", node, VALUE_LONGEST);
+    value_form form = {.type = field->form.type, .order = field->form.order};
+    conversion *of = field->conversion;
+    const char *wrong;
+    int is_hex;
+
+    if (!text)
+        return 0;
+    if (strcmp(text, STANDARD) == 0) {
+        of->is_standard = 1;
+        return 1;
+    }
+    if (is_bit(planned)) {
+        /* Several bits are one number, whatever the order of the field is. */
+        form.type = MBM_TYPE_UINT16;
+        form.order = MBM_ORDER_ABCD;
+    }
+    is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
+    if (planned->type == MBM_TYPE_TEXT ||
+        (is_shared && is_hex && strlen(text) - 2 != hex_digits(planned, field)))
+        return is_shared ||
+               yaml_file_refuse(file, node,
+                                "not_available of a text is \"standard\", all of its registers 0, "
+                                "or \"none\"");
+    wrong = conversion_add(of, &form, text);
+    if (!wrong && is_bit(planned) && of->numbers[of->number_count - 1][0] >> planned->count) {
+        of->number_count--;
+        wrong = "is out of range";
+    }
+    return !wrong || is_shared ||
+           yaml_file_refuse(file, node, "not_available: \"%s\" %s%s%s", text, wrong,
+                            strstr(wrong, "range") ? " of " : "",
+                            strstr(wrong, "range")
+                                ? is_bit(planned) ? "these bits" : value_type_names[form.type]
+                                : ": it is " NUMBERS_OR_WORDS);
+}
+
+static int is_none(const yaml_node_t *node)
+{
+    return node->type == YAML_SCALAR_NODE &&
+           strcmp((const char *)node->data.scalar.value, NONE) == 0;
+}
+
+static int read_not_available(yaml_file *file, const yaml_node_t *node, int is_shared,
+                              const mbm_planField *planned, device_field *field)
+{
+    const int is_list = node && node->type == YAML_SEQUENCE_NODE;
+    size_t count = 1, at;
+
+    if (!node || is_none(node))
+        return 1;
+    if (planned->table <= MBM_TABLE_DISCRETE_INPUTS || (is_bit(planned) && planned->count == 1))
+        return is_shared || yaml_file_refuse(file, node, "a bit has no not_available");
+    if (is_list)
+        count = yaml_file_items(file, "not_available", node, CONVERSION_NUMBERS);
+    if (count == 0 || !make_conversion(file, field))
+        return 0;
+    field->conversion->numbers =
+        (uint16_t(*)[VALUE_WORDS])calloc(count, sizeof *field->conversion->numbers);
+    if (!field->conversion->numbers)
+        return yaml_file_fail(file, ENOMEM);
+    for (at = 0; at < count; at++)
+        if (!add_number(file, is_list ? yaml_file_item(file, node, at) : node, is_shared, planned,
+                        field))
+            return 0;
+    return 1;
+}
+
+int device_values_check_shared(yaml_file *file, const yaml_node_t *shared)
+{
+    const int is_list = shared && shared->type == YAML_SEQUENCE_NODE;
+    size_t count = 1, at;
+
+    if (!shared || is_none(shared))
+        return 1;
+    if (is_list)
+        count = yaml_file_items(file, "not_available", shared, CONVERSION_NUMBERS);
+    if (count == 0)
+        return 0;
+    for (at = 0; at < count; at++) {
+        const yaml_node_t *node = is_list ? yaml_file_item(file, shared, at) : shared;
+        const char *text = yaml_file_text(file, "not_available", node, VALUE_LONGEST);
+        static decimal_number number;
+        size_t digits;
+
+        if (!text)
+            return 0;
+        digits = strlen(text) < 2 ? 0 : strlen(text) - 2;
+        if (text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
+            if (strspn(text + 2, "0123456789abcdefABCDEF") != digits ||
+                (digits != 4 && digits != 8 && digits != 16))
+                return yaml_file_refuse(file, node,
+                                        "not_available: \"%s\" at the head of the file must have "
+                                        "4, 8 or 16 digits after 0x, and is for the fields of 16, "
+                                        "32 or 64 bits",
+                                        text);
+        } else if (strcmp(text, STANDARD) != 0 && !decimal_read(text, strlen(text), &number)) {
+            return yaml_file_refuse(file, node, "not_available: \"%s\" is not " NUMBERS_OR_WORDS,
+                                    text);
+        }
+    }
+    return 1;
+}
+
+int device_values_read(yaml_file *file, const device_values *values, const yaml_node_t *shared,
+                       const mbm_planField *planned, device_field *field)
+{
+    const int has_own = values->not_available != NULL;
+
+    field->power_field = -1;
+    return read_scale(file, values->scale, planned, field) &&
+           read_offset(file, values->offset, planned, field) &&
+           read_precision(file, values->precision, planned, field) &&
+           read_limits(file, values, planned, field) &&
+           read_not_available(file, has_own ? values->not_available : shared, !has_own, planned,
+                              field);
+}
+
+/* --- a power of ten --- */
+
+/* Why a field cannot have the power of ten of another one; NULL if it can. */
+static const char *check_power(const device *of, uint16_t field, uint16_t power)
+{
+    const mbm_planField *planned = &of->planned[power];
+    const device_field *one = &of->fields[power];
+
+    if (field == power)
+        return "is the field itself";
+    if (planned->type < MBM_TYPE_UINT16 || planned->type > MBM_TYPE_INT64)
+        return "is no integer: a power of ten is one, mostly an int16";
+    if (planned->count > 1)
+        return "has several values";
+    if (planned->unit != of->planned[field].unit)
+        return "is of another unit";
+    if (one->power_name || one->form.scale.digits != 0 ||
+        (one->conversion && one->conversion->offset.digits != 0))
+        return "has a scale or an offset itself";
+    if (!(one->access & DEVICE_READ))
+        return "cannot be read";
+    return NULL;
+}
+
+/* The power of ten that a field has in the file, 0 if that is none. */
+static int power_in_file(const device *of, uint16_t power)
+{
+    const mbm_planField *planned = &of->planned[power];
+    mbm_registers registers;
+    char text[VALUE_TEXT_BYTES];
+    long number;
+
+    if (!of->fields[power].words)
+        return 0;
+    (void)mbm_registers_ofWords(&registers, of->fields[power].words, (uint16_t)device_size(planned),
+                                0);
+    if (conversion_print(&of->fields[power].form, &registers, 0, 1, 0, text) != MBM_OK)
+        return 0;
+    number = strtol(text, NULL, 10);
+    return number < -DEVICE_POWER || number > DEVICE_POWER ? 0 : (int)number;
+}
+
+/* Returns the index of the field with a name, or -1. */
+static int find_name(const device *of, const char *name)
+{
+    int at;
+
+    for (at = 0; at < of->count; at++)
+        if (strcmp(of->fields[at].name, name) == 0)
+            return at;
+    return -1;
+}
+
+int device_values_find_power(yaml_file *file, device *of, uint16_t field)
+{
+    device_field *one = &of->fields[field];
+    int power = find_name(of, one->power_name);
+    const char *wrong;
+
+    /* A field outside of the repetition. */
+    if (power < 0)
+        power = find_name(of, one->power_plain);
+    if (power < 0)
+        return yaml_file_refuse_line(file, one->scale_line,
+                                     "scale: \"%s\" is neither a decimal number of up to 18 digits "
+                                     "other than 0 nor the name of a field",
+                                     one->power_plain);
+    wrong = check_power(of, field, (uint16_t)power);
+    if (wrong)
+        return yaml_file_refuse_line(file, one->scale_line, "scale: the field %s in line %d %s",
+                                     of->fields[power].name, of->fields[power].line, wrong);
+    one->power_field = power;
+    one->form.scale = conversion_power(power_in_file(of, (uint16_t)power));
+    return 1;
+}
