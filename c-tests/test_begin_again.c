@@ -1,4 +1,5 @@
 /* Beginning an object again: it gives up all that was pending. */
+#include "every_call.h"
 #include "refused.h"
 #include "hooked_port.h"
 #include "mbm.h"
@@ -46,13 +47,7 @@ fixture each_test = {reset, NULL};
 /* Begins the client with the framing of a number, on either port. */
 static uint8_t begin(unsigned framing, const mbm_port *on)
 {
-    switch (framing) {
-    case MBM_FRAMING_RTU: return mbm_client_beginRtu(&client, on, frame, sizeof frame);
-    case MBM_FRAMING_ASCII: return mbm_client_beginAscii(&client, on, frame, sizeof frame);
-    case MBM_FRAMING_TCP:
-        return mbm_client_beginTcp(&client, on, frame, sizeof frame, outgoing, sizeof outgoing);
-    default: return mbm_client_beginRtuOverTcp(&client, on, frame, sizeof frame);
-    }
+    return CLIENT_BEGIN(&client, framing, on, frame, outgoing);
 }
 
 static void ask_three_times(void)

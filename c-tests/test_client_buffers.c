@@ -3,6 +3,7 @@
  * The client accesses parts of its buffers without checks. The tests give it buffers of many
  * sizes from malloc, exactly as long as begin is given. The port's hooks write and read every byte
  * that they are given, so that AddressSanitizer reports one outside. */
+#include "every_call.h"
 #include "mbm.h"
 #include "test.h"
 
@@ -83,23 +84,15 @@ static void begin(line *l, unsigned framing)
     port.read = read_any;
     port.write = write_some;
     port.micros = clock_of;
-    l->is_tcp = framing == 3;
+    l->is_tcp = framing == MBM_FRAMING_TCP;
     l->incoming_bytes = (uint16_t)(17 + chance(chance(2) ? 8 : 600));
     l->outgoing_bytes = (uint16_t)(12 + chance(chance(2) ? 8 : 600));
     l->incoming = malloc(l->incoming_bytes);
     l->outgoing = malloc(l->outgoing_bytes);
     assert_non_null(l->incoming);
     assert_non_null(l->outgoing);
-    switch (framing) {
-    case 0: OK(mbm_client_beginRtu(&l->client, &port, l->incoming, l->incoming_bytes)); break;
-    case 1: OK(mbm_client_beginAscii(&l->client, &port, l->incoming, l->incoming_bytes)); break;
-    case 2:
-        OK(mbm_client_beginRtuOverTcp(&l->client, &port, l->incoming, l->incoming_bytes));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&l->client, &port, l->incoming, l->incoming_bytes, l->outgoing,
-                               l->outgoing_bytes));
-    }
+    OK(client_begin(&l->client, framing, &port, l->incoming, l->incoming_bytes, l->outgoing,
+                    l->outgoing_bytes));
     OK(mbm_client_setResponseTimeout(&l->client, 50));
     OK(mbm_client_setRetries(&l->client, (uint8_t)chance(3)));
 }

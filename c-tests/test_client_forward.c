@@ -1,5 +1,6 @@
 /* Requests that the client forwards as they arrived, and the replies that it accepts for
  * them, over a port in memory. */
+#include "every_call.h"
 #include "await.h"
 #include "node.h"
 #include "server.h"
@@ -67,12 +68,7 @@ static void begin(int framing)
     memset(&client, 0, sizeof client);
     memset(&request, 0, sizeof request);
     memset(reply, 0xEE, sizeof reply);
-    if (framing == MBM_FRAMING_RTU)
-        OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
-    else if (framing == MBM_FRAMING_RTU_OVER_TCP)
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-    else
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
     request.unit = UNIT;
     request.reply = reply;
     request.replyBytes = sizeof reply;

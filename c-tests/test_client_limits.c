@@ -1,6 +1,7 @@
 /* The response timeout and the retries of one request and of one unit, and repetitions while
  * a device is busy: in every framing over a port in memory, and with many requests in flight
  * against a TCP peer whose replies and exceptions libmodbus makes. */
+#include "every_call.h"
 #include "refused.h"
 #include "client.h"
 #include "memory_port.h"
@@ -22,7 +23,7 @@ static uint16_t words[4];
 static const uint8_t framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
                                    MBM_FRAMING_RTU_OVER_TCP};
 
-static void begin(int framing)
+static void begin(unsigned framing)
 {
     const mbm_port port = memory_port_of(&m);
 
@@ -30,17 +31,9 @@ static void begin(int framing)
     memset(&client, 0, sizeof client);
     memset(&request, 0, sizeof request);
     memset(units, 0, sizeof units);
-    switch (framing) {
-    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
+    if (framing == MBM_FRAMING_TCP)
         OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
-        break;
-    }
     OK(mbm_client_setResponseTimeout(&client, CLIENTS));
     OK(mbm_client_setQuietTime(&client, 0));
     units[0].unit = UNIT + 1;

@@ -1,5 +1,6 @@
 /* The client over a port in memory: when its link is known to be lost, how its waits vary,
  * and which transaction identifier is on the wire. */
+#include "every_call.h"
 #include "bus.h"
 #include "memory_port.h"
 #include "test.h"
@@ -19,17 +20,9 @@ static void begin(int framing)
     memset(&m, 0, sizeof m);
     memset(&client, 0, sizeof client);
     memset(&request, 0, sizeof request);
-    switch (framing) {
-    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
+    if (framing == MBM_FRAMING_TCP)
         OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
-        break;
-    }
     request.unit = UNIT;
     request.reply = words;
     request.replyBytes = sizeof words;

@@ -1,5 +1,6 @@
 /* A client's link: what it does when the peer closes connections that are idle, or falls silent on
  * one that stays open. */
+#include "every_call.h"
 #include "linked.h"
 
 static const uint8_t streams[] = {MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
@@ -437,17 +438,9 @@ static void begin_in_flight(int framing, uint16_t accepted)
     port.postTransmission = driver_off;
     memset(&client, 0, sizeof client);
     driver = 0;
-    switch (framing) {
-    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
+    if (framing == MBM_FRAMING_TCP)
         OK(mbm_client_setInFlight(&client, 1));
-        break;
-    }
     OK(mbm_client_setResponseTimeout(&client, 300));
     OK(mbm_client_setQuietTime(&client, 0));
     accepts = accepted;

@@ -51,7 +51,6 @@ typedef struct accessor {
 #define GETS(name, with_value, with_null)                                                          \
     static uint8_t call_##name(const mbm_registers *v, uint16_t address, uint8_t order)            \
     {                                                                                              \
-        (void)order;                                                                               \
         return mbm_registers_##name with_value;                                                    \
     }                                                                                              \
     static uint8_t null_##name(const mbm_registers *v)                                             \

@@ -450,12 +450,7 @@ static uint32_t reentrant_random(void *context)
 static void begin_client(int framing)
 {
     memset(&client, 0, sizeof client);
-    switch (framing) {
-    case 0: OK(mbm_client_beginRtu(&client, &port, small_frame, 256)); break;
-    case 1: OK(mbm_client_beginAscii(&client, &port, small_frame, 256)); break;
-    case 2: OK(mbm_client_beginTcp(&client, &port, small_frame, 260, other_frame, 260)); break;
-    default: OK(mbm_client_beginRtuOverTcp(&client, &port, small_frame, 256));
-    }
+    OK(client_begin(&client, (unsigned)framing, &port, small_frame, 256, other_frame, 260));
     OK(mbm_client_setResponseTimeout(&client, 20));
     OK(mbm_client_setQuietTime(&client, 1));
 }

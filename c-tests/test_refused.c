@@ -297,12 +297,7 @@ static uint8_t begin_client(int framing, uint16_t in, uint16_t out)
     free(outgoing);
     incoming = (uint8_t *)malloc(in);
     outgoing = (uint8_t *)malloc(out);
-    switch (framing) {
-    case 0: return mbm_client_beginRtu(&client, &port, incoming, in);
-    case 1: return mbm_client_beginAscii(&client, &port, incoming, in);
-    case 2: return mbm_client_beginTcp(&client, &port, incoming, in, outgoing, out);
-    default: return mbm_client_beginRtuOverTcp(&client, &port, incoming, in);
-    }
+    return client_begin(&client, (unsigned)framing, &port, incoming, in, outgoing, out);
 }
 
 static void all_client_begins_are(uint8_t status, const mbm_port *p, uint8_t *frame, uint16_t bytes)

@@ -1,5 +1,6 @@
 /* mbm_client_reply: the reply of each function as a packet, compared with what
  * mbm_frame_parse makes of the frame that arrived. */
+#include "every_call.h"
 #include "served.h"
 #include "examples.h"
 #include "memory_port.h"
@@ -23,14 +24,7 @@ static void begin(uint8_t kind)
 
     memset(&m, 0, sizeof m);
     memset(&request, 0, sizeof request);
-    if (kind == MBM_FRAMING_RTU)
-        OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame));
-    else if (kind == MBM_FRAMING_ASCII)
-        OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame));
-    else if (kind == MBM_FRAMING_RTU_OVER_TCP)
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-    else
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, kind, &port, frame, outgoing));
     request.unit = UNIT;
     request.reply = reply;
     request.replyBytes = sizeof reply;

@@ -1,6 +1,7 @@
 /* Replies that consist of a function code alone: the counter of an energy meter is reset with
  * function 42, and the meter answers with unit, function and CRC. And the length rules of a
  * program, which hold for every function code. All in memory, with one clock. */
+#include "every_call.h"
 #include "memory_port.h"
 #include "test.h"
 
@@ -73,24 +74,8 @@ static void begin(uint8_t framing, const char *bytes, uint16_t count)
     answer.count = count;
     answer.calls = 0;
     unit.id = UNIT;
-    switch (framing) {
-    case MBM_FRAMING_RTU:
-        OK(mbm_client_beginRtu(&client, near_port, frame, sizeof frame));
-        OK(mbm_server_beginRtu(&server, &far_port, &unit, 1, served, sizeof served));
-        break;
-    case MBM_FRAMING_ASCII:
-        OK(mbm_client_beginAscii(&client, near_port, frame, sizeof frame));
-        OK(mbm_server_beginAscii(&server, &far_port, &unit, 1, served, sizeof served));
-        break;
-    case MBM_FRAMING_TCP:
-        OK(mbm_client_beginTcp(&client, near_port, frame, sizeof frame, outgoing, sizeof outgoing));
-        OK(mbm_server_beginTcp(&server, &far_port, &unit, 1, served, sizeof served));
-        break;
-    default:
-        OK(mbm_client_beginRtuOverTcp(&client, near_port, frame, sizeof frame));
-        OK(mbm_server_beginRtuOverTcp(&server, &far_port, &unit, 1, served, sizeof served));
-        break;
-    }
+    OK(CLIENT_BEGIN(&client, framing, near_port, frame, outgoing));
+    OK(server_begin(&server, framing, &far_port, &unit, 1, served, sizeof served));
     custom.serve = serve;
     OK(mbm_unit_serveCustom(&unit, &custom));
     OK(mbm_sniffer_begin(&sniffer, framing, seen, sizeof seen));

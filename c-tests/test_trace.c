@@ -1,5 +1,6 @@
 /* The trace before a port: its records, what it passes on, refused calls, and calls from within
  * its hook. How it cuts bytes into frames is tested in tests/trace. */
+#include "every_call.h"
 #include "refused.h"
 #include "hooked_port.h"
 #include "test.h"
@@ -144,14 +145,7 @@ TEST(a_client_of_each_framing_works_through_a_trace)
         OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, framing, buffer, sizeof buffer, keep,
                            NULL));
         traced = mbm_trace_port(&trace);
-        switch (kind) {
-        case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, traced, frame, 256)); break;
-        case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, traced, frame, 513)); break;
-        case MBM_FRAMING_TCP:
-            OK(mbm_client_beginTcp(&client, traced, frame, 260, other, 260));
-            break;
-        default: OK(mbm_client_beginRtuOverTcp(&client, traced, frame, 256));
-        }
+        OK(CLIENT_BEGIN(&client, kind, traced, frame, other));
         request.unit = 17;
         request.reply = words;
         request.replyBytes = sizeof words;

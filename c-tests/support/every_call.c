@@ -93,3 +93,25 @@ void every_client_request_returns(uint8_t status, mbm_client *c, mbm_clientReque
     RETURNS(mbm_client_custom(c, r, 65, 1, &silence));
     RETURNS(mbm_client_forward(c, r, 65, &byte, 1));
 }
+
+uint8_t client_begin(mbm_client *c, unsigned framing, const mbm_port *port, uint8_t *incoming,
+                     uint16_t in, uint8_t *outgoing, uint16_t out)
+{
+    switch (framing) {
+    case MBM_FRAMING_RTU: return mbm_client_beginRtu(c, port, incoming, in);
+    case MBM_FRAMING_ASCII: return mbm_client_beginAscii(c, port, incoming, in);
+    case MBM_FRAMING_TCP: return mbm_client_beginTcp(c, port, incoming, in, outgoing, out);
+    default: return mbm_client_beginRtuOverTcp(c, port, incoming, in);
+    }
+}
+
+uint8_t server_begin(mbm_server *s, unsigned framing, const mbm_port *port, mbm_unit *units,
+                     uint8_t count, uint8_t *frame, uint16_t bytes)
+{
+    switch (framing) {
+    case MBM_FRAMING_RTU: return mbm_server_beginRtu(s, port, units, count, frame, bytes);
+    case MBM_FRAMING_ASCII: return mbm_server_beginAscii(s, port, units, count, frame, bytes);
+    case MBM_FRAMING_TCP: return mbm_server_beginTcp(s, port, units, count, frame, bytes);
+    default: return mbm_server_beginRtuOverTcp(s, port, units, count, frame, bytes);
+    }
+}
