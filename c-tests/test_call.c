@@ -31,10 +31,7 @@ static volatile sig_atomic_t signals, stop;
 
 static void prepare(void)
 {
-    memset(&request, 0, sizeof request);
-    request.unit = UNIT;
-    request.reply = words;
-    request.replyBytes = sizeof words;
+    request = (mbm_clientRequest){.unit = UNIT, .reply = words, .replyBytes = sizeof words};
     stop = signals = 0;
     main_thread = pthread_self();
 }

@@ -79,11 +79,7 @@ static void begin(line *l, unsigned framing)
     mbm_port port;
 
     memset(l, 0, sizeof *l);
-    memset(&port, 0, sizeof port);
-    port.context = l;
-    port.read = read_any;
-    port.write = write_some;
-    port.micros = clock_of;
+    port = (mbm_port){.context = l, .read = read_any, .write = write_some, .micros = clock_of};
     l->is_tcp = framing == MBM_FRAMING_TCP;
     l->incoming_bytes = (uint16_t)(17 + chance(chance(2) ? 8 : 600));
     l->outgoing_bytes = (uint16_t)(12 + chance(chance(2) ? 8 : 600));

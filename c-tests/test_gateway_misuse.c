@@ -338,9 +338,7 @@ TEST(done_may_use_the_gateway_if_the_program_polls_the_line)
 {
     static mbm_clientRequest own;
 
-    memset(&own, 0, sizeof own);
-    own.unit = 9;
-    own.done = done_and_close;
+    own = (mbm_clientRequest){.unit = 9, .done = done_and_close};
     IS(MBM_PENDING, mbm_client_readExceptionStatus(&b.clients[0], &own));
     ASK(0, 1, 2, READ);
     ON_LINE(0, 9, "\x07");

@@ -550,10 +550,9 @@ TEST(own_units_are_served_beside_the_lines)
     static const mbm_gatewayRoute local[] = {{1, 31, 0, 0}, {200, 201, MBM_GATEWAY_LOCAL, 7}};
 
     gateway_bench_start(&b, local, COUNT(local));
-    memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
     memset(&custom, 0, sizeof custom);
-    unit.id = 7;
+    unit = (mbm_unit){.id = 7};
     table.words = words;
     table.size = COUNT(words);
     custom.code = 0x41;

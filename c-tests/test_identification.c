@@ -469,7 +469,6 @@ static uint8_t report(begin_function begins, uint16_t capacity, const char *answ
     mbm_port port = {0};
 
     memset(&asking, 0, sizeof asking);
-    memset(&request, 0, sizeof request);
     memset(id_reply, 0xEE, sizeof id_reply);
     memset(&d, 0, sizeof d);
     d.length = sim_bytes(d.answer, answer);
@@ -477,9 +476,7 @@ static uint8_t report(begin_function begins, uint16_t capacity, const char *answ
     port.read = read_bytes;
     port.write = write_bytes;
     port.micros = micros;
-    request.unit = 17;
-    request.reply = id_reply;
-    request.replyBytes = capacity;
+    request = (mbm_clientRequest){.unit = 17, .reply = id_reply, .replyBytes = capacity};
     OK(begins(&asking, &port, frame, sizeof frame));
     IS(MBM_PENDING, mbm_client_reportServerId(&asking, &request));
     while (request.status == MBM_PENDING)

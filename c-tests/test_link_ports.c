@@ -263,8 +263,7 @@ TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
 
     assert_non_null(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/tty", folder);
-    memset(&unit, 0, sizeof unit);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     memset(&a, 0, sizeof a);
     a.port = mbm_tty_port(&a.tty);

@@ -267,13 +267,12 @@ static uint8_t frames[PLACES][MBM_MAX_TCP_FRAME], lone_frame[MBM_MAX_TCP_FRAME];
 
 static void begin_unit(void)
 {
-    memset(&unit, 0, sizeof unit);
     memset(places, 0, sizeof places);
     memset(served, 0, sizeof served);
     memset(&listener, 0, sizeof listener);
     memset(&accepting, 0, sizeof accepting);
     memset(&lone_entry, 0, sizeof lone_entry);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0x1200 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));

@@ -471,8 +471,7 @@ TEST(no_hook_of_a_clients_port_nor_its_random_function_may_call_the_client)
         OK(mbm_client_setRetries(&client, 2));
         OK(mbm_client_setBackoff(&client, MBM_BACKOFF_FIXED, 1, 1));
         OK(mbm_client_setJitter(&client, 100, reentrant_random, NULL));
-        memset(&request, 0, sizeof request);
-        request.unit = 17;
+        request = (mbm_clientRequest){.unit = 17};
         entered = drawn = 0;
         IS(MBM_PENDING, mbm_client_readCoils(&client, &request, 0, 1));
         assert_true(mbm_client_pollDelay(&client) < 0xFFFFFFFFu);

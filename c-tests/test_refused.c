@@ -79,9 +79,8 @@ TEST(a_server_goes_on_after_a_refused_begin)
     mbm_custom custom = {.serve = later, .code = 65};
 
     memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
     memset(&table, 0, sizeof table);
-    unit.id = 17;
+    unit = (mbm_unit){.id = 17};
     table.words = words;
     table.size = MBM_MAX_READ_REGISTERS;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));

@@ -322,9 +322,8 @@ TEST(a_function_that_declines_may_fill_the_last_place)
     static mbm_unit full;
 
     memset(all, 0, sizeof all);
-    memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
-    full.id = 17;
+    full = (mbm_unit){.id = 17};
     for (int i = 0; i < MBM_MAX_SERVICES - 1; i++) {
         all[i].serve = echo;
         all[i].code = (uint8_t)(66 + i);
@@ -342,9 +341,8 @@ TEST(a_unit_with_all_places_taken_refuses_other_functions)
     static mbm_unit full;
 
     memset(all, 0, sizeof all);
-    memset(&full, 0, sizeof full);
     memset(&late, 0, sizeof late);
-    full.id = 17;
+    full = (mbm_unit){.id = 17};
     for (int i = 0; i < MBM_MAX_SERVICES; i++) {
         all[i].serve = echo;
         all[i].code = (uint8_t)(66 + i);
@@ -428,8 +426,7 @@ static uint8_t become_bits(void *context, const mbm_access *access)
 /* Serves four registers with these hooks, from new. */
 static void serve_hooked(const mbm_accessHooks *hooks)
 {
-    memset(&hooked_unit, 0, sizeof hooked_unit);
-    hooked_unit.id = 17;
+    hooked_unit = (mbm_unit){.id = 17};
     memset(changing, 0, sizeof *changing);
     changing->words = cells;
     changing->size = 4;

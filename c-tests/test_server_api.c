@@ -232,8 +232,7 @@ TEST(a_broadcast_is_carried_out_only_if_it_only_writes)
 {
     static mbm_dataCallbacks cells;
 
-    memset(&cells, 0, sizeof cells);
-    cells.get = count_reads;
+    cells = (mbm_dataCallbacks){.get = count_reads};
     custom.serve = own;
     custom.context = &custom_result;
     custom_result = 0;

@@ -58,11 +58,8 @@ static void begin(uint32_t baud)
     const mbm_port port = {.read = receive, .write = transmit, .micros = micros};
 
     memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
-    memset(&holding, 0, sizeof holding);
-    unit.id = UNIT;
-    holding.words = words;
-    holding.size = MOST;
+    unit = (mbm_unit){.id = UNIT};
+    holding = (mbm_registerTable){.words = words, .size = MOST};
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
     OK(mbm_server_setBaudRate(&server, baud));

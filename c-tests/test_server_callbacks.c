@@ -28,13 +28,12 @@ static void set(void *context, uint16_t address, uint16_t value)
 
 static void reset(void)
 {
-    memset(&unit, 0, sizeof unit);
     memset(&cells, 0, sizeof cells);
     memset(&table, 0, sizeof table);
     memset(&bits, 0, sizeof bits);
     memset(words, 0, sizeof words);
     gets = sets = 0;
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     cells.get = get;
     table.words = words;
     table.size = 8;
@@ -146,12 +145,10 @@ TEST(hooks_are_set_before_or_after_registering_and_removed)
     static mbm_files files;
     static mbm_file file;
 
-    memset(&files, 0, sizeof files);
     file.records = words;
     file.size = 8;
     file.number = 1;
-    files.files = &file;
-    files.count = 1;
+    files = (mbm_files){.files = &file, .count = 1};
     OK(mbm_registerTable_setHooks(&table, &watching.hooks));
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
     OK(mbm_unit_serveCoils(&unit, &bits));

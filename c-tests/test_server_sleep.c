@@ -47,10 +47,9 @@ static uint16_t slow(void *context, const mbm_request *request, uint8_t *respons
 static void reset(void)
 {
     memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
     memset(&holding, 0, sizeof holding);
     memset(&custom, 0, sizeof custom);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     holding.words = words;
     holding.size = 4;
     custom.code = SLOW;

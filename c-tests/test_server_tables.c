@@ -28,10 +28,9 @@ static void fill(mbm_registerTable *table, uint16_t *words, uint16_t base)
 /* Registers 100 to 103 and 200 to 203. */
 static void reset(void)
 {
-    memset(&unit, 0, sizeof unit);
     memset(&diagnostics, 0, sizeof diagnostics);
     memset(&custom, 0, sizeof custom);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     custom_calls = reads[0] = reads[1] = 0;
     fill(&low_table, low, 100);
     fill(&high_table, high, 200);
@@ -168,9 +167,7 @@ TEST(a_table_and_callbacks_serve_one_kind_side_by_side)
 {
     static mbm_dataCallbacks cells;
 
-    memset(&cells, 0, sizeof cells);
-    cells.get = get;
-    cells.isValid = is_valid;
+    cells = (mbm_dataCallbacks){.get = get, .isValid = is_valid};
     OK(mbm_unit_serveHoldingRegisters(&unit, &low_table));
     OK(mbm_unit_serveCallbacks(&unit, &cells, 3));
     OK(mbm_unit_serveHoldingRegisters(&unit, &high_table));

@@ -528,8 +528,7 @@ TEST_WITH(a_trace_that_was_never_begun_has_no_port, setup, NULL)
         IS(status, mbm_trace_flush(both[i]));
     }
     memset(&record, 0x77, sizeof record);
-    memset(&event, 0, sizeof event);
-    event.kind = MBM_EVENT_TIMEOUT;
+    event = (mbm_event){.kind = MBM_EVENT_TIMEOUT};
     REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(&event, &record));
     REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(NULL, &record));
     IS(MBM_INVALID_ARGUMENT, mbm_trace_ofEvent(&event, NULL));

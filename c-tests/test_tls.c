@@ -26,10 +26,7 @@ static void begin(void)
         words[i] = (uint16_t)(0xA55A ^ i);
     unit.id = 17;
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-    memset(&request, 0, sizeof request);
-    request.unit = 17;
-    request.reply = read_words;
-    request.replyBytes = sizeof read_words;
+    request = (mbm_clientRequest){.unit = 17, .reply = read_words, .replyBytes = sizeof read_words};
     OK(mbm_client_beginTcp(&client, &pair.client.port, incoming, sizeof incoming, outgoing,
                            sizeof outgoing));
     OK(mbm_server_beginTcp(&server, &pair.server.port, &unit, 1, frame, sizeof frame));

@@ -24,8 +24,7 @@ static char role[MBM_TLS_ROLE_BYTES + 1]; /* of the session that was polled last
 
 static void begin(void)
 {
-    memset(&unit, 0, sizeof unit);
-    unit.id = 17;
+    unit = (mbm_unit){.id = 17};
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     tls_identify(&identity, "server", "authority", 1);
 }
@@ -469,8 +468,7 @@ static void begin_unit(int guarded)
     static const mbm_accessHooks hooks = {.beforeWrite = before_write};
 
     memset(&unit, 0, sizeof unit);
-    memset(&every_function, 0, sizeof every_function);
-    every_function.serve = authorise;
+    every_function = (mbm_custom){.serve = authorise};
     held = (mbm_registerTable){.words = held_words, .base = FIRST_WORD, .size = WORDS};
     for (unsigned i = 0; i < WORDS; i++)
         held_words[i] = (uint16_t)(500 + i);
@@ -577,8 +575,7 @@ static void begin_pair(void)
 {
     tls_pair_begin(&pair, "operator", "server");
     pair.idle = serve;
-    memset(&unit, 0, sizeof unit);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     master_holding =
         (mbm_registerTable){.words = master_words, .base = MASTER_FIRST, .size = MASTER_WORDS};
     for (unsigned i = 0; i < MASTER_WORDS; i++)

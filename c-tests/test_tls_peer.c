@@ -44,8 +44,7 @@ static const uint8_t reply[] = {0x12, 0x34, 0, 0, 0, 9, 17, 3, 6, 0xA0, 0, 0xA0,
 
 static void begin(void)
 {
-    memset(&unit, 0, sizeof unit);
-    unit.id = 17;
+    unit = (mbm_unit){.id = 17};
     for (unsigned i = 0; i < COUNT_OF_WORDS; i++)
         words[i] = (uint16_t)(0xA000 + i);
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));

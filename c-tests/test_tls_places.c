@@ -88,8 +88,7 @@ static void begin(void)
 {
     ahead = 0;
     looks = 0;
-    memset(&unit, 0, sizeof unit);
-    unit.id = 17;
+    unit = (mbm_unit){.id = 17};
     words[0] = 0xBEEF;
     OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
     tls_identify(&identity, "server", "authority", 1);

@@ -35,8 +35,7 @@ static void begin(void)
 {
     const mbm_port port = mbm_udp_port(&sender);
 
-    memset(&unit, 0, sizeof unit);
-    unit.id = UNIT;
+    unit = (mbm_unit){.id = UNIT};
     holding = (mbm_registerTable){.words = words, .base = FIRST, .size = WORDS};
     for (unsigned i = 0; i < WORDS; i++)
         words[i] = (uint16_t)(0xB000 + i);
