@@ -23,6 +23,7 @@ static const command commands[] = {
     {"identify", "show what a device says about itself", identify_command},
     {"poll", "read the values of a device file", poll_command},
     {"header", "write a C header from a device file, for firmware", header_command},
+    {"import", "make a device file of another program's configuration", import_command},
     {"serve", "be a device, with faults on request", serve_command},
     {"sniff", "decode what others send on a line", sniff_command},
     {"gateway", "pass requests from Modbus TCP to serial lines", gateway_command},

@@ -93,6 +93,7 @@ int serve_command(int argc, char **argv);
 int sniff_command(int argc, char **argv);
 int gateway_command(int argc, char **argv);
 int header_command(int argc, char **argv);
+int import_command(int argc, char **argv);
 int bridge_command(int argc, char **argv);
 
 #endif

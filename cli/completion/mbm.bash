@@ -24,6 +24,7 @@ _mbm() {
         case $before in
         --table | --type | --order | --category | --parities | --framing | --log-level | --discovery | --write-function | -[a-zA-Z])
             words=$(_mbm_words "$command" "$before") ;;
+        import) words=$(_mbm_words import '') ;;
         --rates) words="1200 2400 4800 9600 19200 38400 57600 115200" ;;
         esac
     fi
@@ -32,7 +33,7 @@ _mbm() {
         rtu:* | ascii:*)
             words=$(compgen -G "${word#*:}*" | grep -e '/tty' -e '/pts' -e '/dev$' | sed "s|^|${word%%:*}:|") ;;
         */* | ?*.*) ;;
-        *) [[ $command == header || $line =~ \ (rtu|ascii|(rtu\+)?tcp|udp|tls): ]] || words="rtu:/dev/tty ascii:/dev/tty tcp:// rtu+tcp:// udp:// tls://" ;;
+        *) [[ $command == header || $command == import || $line =~ \ (rtu|ascii|(rtu\+)?tcp|udp|tls): ]] || words="rtu:/dev/tty ascii:/dev/tty tcp:// rtu+tcp:// udp:// tls://" ;;
         esac
         compopt -o nospace -o default 2>/dev/null
     fi

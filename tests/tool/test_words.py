@@ -286,7 +286,7 @@ def test_each_command_has_its_help(mbm):
     assert code == DONE and out.startswith("Usage: mbm COMMAND") and not error
     assert mbm("help") == (DONE, out, "")
     commands = re.findall(r"^  (\w+) ", out.split("Options:")[0], re.M)
-    assert len(commands) == 11, commands
+    assert len(commands) == 12, commands
     for command in commands:
         code, text, error = mbm(command, "--help")
         assert code == DONE and text.startswith(f"Usage: mbm {command} ") and re.search(rf"^ *mbm {command} ", text, re.M), text + error
@@ -317,7 +317,7 @@ def completed(mbm):
 @pytest.mark.parametrize("line, wanted", [
     ("mbm wr", ["write"]), ("mbm help sc", ["scan"]), ("mbm read --ta", ["--table"]),
     ("mbm read tcp://h --table ", ["coils", "discrete", "holding", "input"]), ("mbm read -o D", ["DCBA"]),
-    ("mbm read tcp", ["tcp://"]), ("mbm header tcp", []), ("mbm header --mark", ["--markdown"])])
+    ("mbm read tcp", ["tcp://"]), ("mbm header tcp", []), ("mbm import tel", ["telegraf"]), ("mbm header --mark", ["--markdown"])])
 def test_bash_completes_commands_options_words_and_lines(completed, line, wanted):
     assert completed(line) == wanted
 
@@ -328,7 +328,7 @@ def test_bash_completes_a_terminal_after_its_colon(completed):
 
 def test_completion_and_man_pages_have_every_command_and_option(mbm, completed):
     commands = completed("mbm ")[:-3]
-    assert len(commands) == 11
+    assert len(commands) == 12
     assert sorted(os.listdir(f"{BUILD}/man")) == sorted([f"mbm-{command}.1" for command in commands] + ["mbm.1"])
     with open(f"{ROOT}/cli/completion/_mbm") as file:
         of_zsh = file.read()
