@@ -80,11 +80,8 @@ TEST(no_row_of_the_fault_table_gets_worse)
 static char client_transacts(asker *a, const fault *f, unsigned number, uint8_t *status)
 {
     uint16_t words[FAULT_REGISTERS];
-    mbm_clientRequest request = {0};
+    mbm_clientRequest request = {.unit = FAULT_UNIT, .reply = words, .replyBytes = sizeof words};
 
-    request.unit = FAULT_UNIT;
-    request.reply = words;
-    request.replyBytes = sizeof words;
     if (f->function == 6)
         IS(MBM_PENDING, mbm_client_writeSingleRegister(&a->client, &request, (uint16_t)number,
                                                        (uint16_t)~number));

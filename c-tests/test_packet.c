@@ -411,12 +411,10 @@ static void carries_data(uint8_t kind, uint8_t function, const char *hex, int is
     const uint8_t first[] = {0x0D, 0xFE, 0x00, 0x20}, second[] = {0x33, 0xCD, 0x00, 0x40};
     const mbm_record records[] = {{first, 4, 1, 2}, {second, 3, 9, 2}};
     uint8_t storage[251], pdu[MBM_MAX_PDU], wanted[64];
-    mbm_packet packet = {0};
+    mbm_packet packet = {.kind = kind, .function = function};
     mbm_record record;
     uint16_t length, cursor = 0, i = 0;
 
-    packet.kind = kind;
-    packet.function = function;
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[0]));
     OK(mbm_packet_addRecord(&packet, storage, sizeof storage, &records[1]));
     OK(mbm_frame_build(PDU(NULL, 0), &packet, pdu, sizeof pdu, &length));
@@ -465,10 +463,8 @@ TEST(an_impossible_record_is_not_added)
     uint8_t storage[600];
 
     for (size_t i = 0; i < COUNT(refused); i++) {
-        mbm_packet packet = {0};
+        mbm_packet packet = {.kind = refused[i].kind, .function = refused[i].function};
 
-        packet.kind = refused[i].kind;
-        packet.function = refused[i].function;
         IS(refused[i].status,
            mbm_packet_addRecord(&packet, storage, sizeof storage, &refused[i].record));
         assert_int_equal(packet.dataLength, 0);

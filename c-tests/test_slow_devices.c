@@ -141,12 +141,8 @@ static int16_t write_bytes(void *context, const uint8_t *bytes, uint16_t count)
 
 static mbm_port port_of(world *w)
 {
-    mbm_port port = {0};
+    mbm_port port = {.read = read_bytes, .write = write_bytes, .micros = micros, .context = w};
 
-    port.read = read_bytes;
-    port.write = write_bytes;
-    port.micros = micros;
-    port.context = w;
     return port;
 }
 
@@ -175,11 +171,8 @@ static uint8_t node_reads(world *w, mbm_node *m, uint8_t unit, uint16_t address,
 static uint8_t client_reads(world *w, mbm_client *c, uint8_t unit, uint16_t address,
                             uint16_t *value)
 {
-    mbm_clientRequest request = {0};
+    mbm_clientRequest request = {.unit = unit, .reply = value, .replyBytes = sizeof *value};
 
-    request.unit = unit;
-    request.reply = value;
-    request.replyBytes = sizeof *value;
     assert_int_equal(mbm_client_readHoldingRegisters(c, &request, address, 1), MBM_PENDING);
     while (request.status == MBM_PENDING) {
         sleep_until_a_byte(w, mbm_client_pollDelay(c));

@@ -22,11 +22,10 @@ static void begin(uint8_t framing)
 static uint16_t frame_of(uint8_t kind, const uint8_t *pdu, uint16_t length, uint8_t side,
                          uint8_t *frame)
 {
-    mbm_framing framing = {0};
+    mbm_framing framing = {.kind = kind};
     mbm_packet packet;
     uint16_t size = 0;
 
-    framing.kind = kind;
     OK(mbm_frame_parse(PDU(NULL, 0), side, (uint8_t *)pdu, length, &packet));
     packet.unit = 17;
     packet.transaction = 7;
@@ -192,13 +191,11 @@ TEST(user_defined_functions_are_reported)
 {
     const mbm_function own[] = {{0x55, {MBM_RULE_FIXED, 3, 0}, {MBM_RULE_COUNTED, 1, 0}}};
     mbm_function many[MBM_MAX_SNIFFER_FUNCTIONS + 1];
-    mbm_framing framing = {0};
+    mbm_framing framing = {.functions = own, .functionCount = 1};
     mbm_packet packet = {0};
     uint8_t frame[MBM_MAX_FRAME];
     uint16_t size;
 
-    framing.functions = own;
-    framing.functionCount = 1;
     OK(mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, buffer, sizeof buffer));
     OK(mbm_sniffer_setFunctions(&sniffer, own, 1));
     packet.unit = 17;

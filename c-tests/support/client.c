@@ -81,12 +81,8 @@ void asker_begin_rtu_over_tcp(asker *a, uint16_t port)
 
 mbm_clientRequest asker_request(uint8_t unit, void *reply, uint16_t bytes, const void *data)
 {
-    mbm_clientRequest request = {0};
+    mbm_clientRequest request = {.unit = unit, .reply = reply, .replyBytes = bytes, .data = data};
 
-    request.unit = unit;
-    request.reply = reply;
-    request.replyBytes = bytes;
-    request.data = data;
     return request;
 }
 

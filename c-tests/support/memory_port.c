@@ -34,12 +34,8 @@ static uint32_t clock_of(void *context)
 
 mbm_port memory_port_of(memory_port *m)
 {
-    mbm_port port = {0};
+    mbm_port port = {.context = m, .read = read_bytes, .write = send_bytes, .micros = clock_of};
 
-    port.context = m;
-    port.read = read_bytes;
-    port.write = send_bytes;
-    port.micros = clock_of;
     return port;
 }
 
