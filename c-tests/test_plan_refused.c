@@ -380,11 +380,17 @@ TEST_WITH(a_field_that_does_not_exist_is_refused, start, NULL)
 TEST_WITH(a_plan_that_was_never_begun_refuses_every_call, start, NULL)
 {
     static const uint16_t count = 1;
+    uint16_t blocks[PLAN_FIELDS];
+    mbm_planSplitting splitting = {.blocks = blocks}, no_blocks = MBM_INIT;
 
     every_call_returns(MBM_INVALID_ARGUMENT, NULL, 0);
     every_call_returns(MBM_NOT_INITIALISED, &none, 0);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_poll(NULL));
     IS(MBM_NOT_INITIALISED, mbm_plan_poll(&none));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(NULL, &splitting));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(&d.plan, NULL));
+    IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(&d.plan, &no_blocks));
+    IS(MBM_NOT_INITIALISED, mbm_plan_pollSplitting(&none, &splitting));
     IS(MBM_INVALID_ARGUMENT, mbm_plan_end(NULL));
     IS(MBM_NOT_INITIALISED, mbm_plan_end(&none));
     assert_int_equal(mbm_plan_pollDelay(NULL), UINT32_MAX);

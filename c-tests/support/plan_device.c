@@ -64,6 +64,18 @@ void plan_device_start(plan_device *d)
     assert_int_equal(field, 0xFFFF);
 }
 
+/* Returns the exception with which a PDU is refused, or 0. */
+static uint8_t refusal(const plan_device *d, const uint8_t *request)
+{
+    unsigned address = (unsigned)request[1] << 8 | request[2];
+    unsigned quantity = (unsigned)request[3] << 8 | request[4], i;
+
+    for (i = address; i < address + quantity; i++)
+        if (d->lacks[i])
+            return MBM_ILLEGAL_DATA_ADDRESS;
+    return d->longest > 0 && quantity > d->longest ? MBM_ILLEGAL_DATA_VALUE : 0;
+}
+
 /* Writes the reply to a PDU, and returns its length. */
 static size_t respond(const plan_device *d, const uint8_t *request, uint8_t *reply)
 {
@@ -96,9 +108,9 @@ static void answer(plan_device *d, const uint8_t *header, uint8_t unit, const ui
     if (way == SILENT || pdu[0] == d->silent_function)
         return;
     length = head + respond(d, pdu, frame + head);
-    if (way == EXCEPTION) {
+    if (way == EXCEPTION || refusal(d, pdu)) {
         frame[head] |= 0x80;
-        frame[head + 1] = 4;
+        frame[head + 1] = way == EXCEPTION ? 4 : refusal(d, pdu);
         length = head + 2;
     }
     frame[head - 1] = unit;
@@ -146,7 +158,10 @@ void plan_device_run(plan_device *d, uint32_t ms)
     while (d->memory.now - begin < ms * 1000) {
         uint32_t left = ms * 1000 - (d->memory.now - begin), delay;
 
-        OK(mbm_plan_poll(&d->plan));
+        if (d->splitting.blocks)
+            OK(mbm_plan_pollSplitting(&d->plan, &d->splitting));
+        else
+            OK(mbm_plan_poll(&d->plan));
         (void)mbm_client_poll(&d->client);
         if (d->memory.sent_count > 0) {
             serve(d);

@@ -36,7 +36,10 @@ typedef struct plan_device {
     uint8_t is_tcp;
     uint16_t registers[PLAN_REGISTERS]; /* of every unit; bit `n` of a table is its bit 0 */
     uint8_t answers[PLAN_UNITS];
-    uint8_t silent_function; /* a function that no unit answers */
+    uint8_t silent_function;       /* a function that no unit answers */
+    uint8_t lacks[PLAN_REGISTERS]; /* 1 for an address that no unit has */
+    uint16_t longest;              /* how much one read may request; 0 for any */
+    mbm_planSplitting splitting;   /* with `blocks` it is used */
     plan_request log[PLAN_LOG];
     unsigned requested;
     plan_update updates[PLAN_LOG];

@@ -226,6 +226,24 @@ typedef struct mbm_planConversion {
     uint8_t flags;
 } mbm_planConversion;
 
+/**
+ * Storage of mbm_plan_pollSplitting. Initialise it with MBM_INIT, and set `blocks`. It is one
+ * plan's alone.
+ */
+typedef struct mbm_planSplitting {
+    /** Storage: as many as fields. */
+    uint16_t *blocks;
+    /** After this time a field that the device does not have is tried again, and a read that was
+     *  divided in vain is tried as a whole, in milliseconds; 0 means 600000, ten minutes. */
+    uint32_t retryMs;
+    uint32_t triedAt; /**< Private. */
+    /** How many reads there is storage for in `reads` of the setup; 0 means `readCount` of the
+     *  setup. As many as fields always suffice. */
+    uint16_t readCount;
+    uint8_t begins; /**< Private. */
+    uint8_t state; /**< Private. */
+} mbm_planSplitting;
+
 /** A read of a plan: one request that it repeats. */
 typedef struct mbm_planReadInfo {
     /** The time from one read to the next, in milliseconds. */
@@ -394,6 +412,30 @@ uint8_t mbm_plan_poll(mbm_plan *plan);
  *         an object that was never begun
  */
 uint32_t mbm_plan_pollDelay(mbm_plan *plan);
+
+/**
+ * As mbm_plan_poll, for devices that lack some fields of the table, or that refuse long reads:
+ * call it instead. Zeroed storage is a plan that has found nothing yet.
+ *
+ * If a device refuses a read with the exceptions 02 or 03, the read is divided, again and again,
+ * until what is refused is one field. Only that field gets the status MBM_ILLEGAL_DATA_ADDRESS
+ * or MBM_ILLEGAL_DATA_VALUE, with a call of `update`; mbm_plan_getStatus returns it from then on.
+ * Meanwhile the other fields keep their status. Neighbours that the device has are read together
+ * again. A field that was found not to be there has a read of its own, which is sent again each
+ * `retryMs`: the device may have it later. Fields that share all their addresses are one.
+ *
+ * Where the storage does not suffice, a read stays as it is, and its fields have its status.
+ * A read that is divided needs another one in `reads`. Bits, and fields that share some of their
+ * addresses, also need spare words in `data`: four times the words of their reads, and
+ * one for each field of bits, always suffice.
+ *
+ * Use only one of the two functions for a plan until it has ended or is begun again. The storage
+ * stays valid until then.
+ *
+ * @param splitting  what was found, and storage
+ * @return as mbm_plan_poll; MBM_INVALID_ARGUMENT without `blocks`
+ */
+uint8_t mbm_plan_pollSplitting(mbm_plan *plan, mbm_planSplitting *splitting);
 
 /**
  * How the last read of a field ended, and how old its value is. The functions that get a value

@@ -16,6 +16,7 @@ pub mod limits;
 mod number;
 mod read;
 pub mod schedule;
+pub mod split;
 pub mod value;
 mod wide;
 

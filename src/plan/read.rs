@@ -66,6 +66,12 @@ pub(super) const HAS_DATA: u8 = 4;
 pub(super) const HELD: u8 = 8;
 /// It is queued or in flight.
 pub(super) const QUEUED: u8 = 16;
+/// It was cut out of another read, and has not been answered since.
+pub(super) const FRESH: u8 = 32;
+/// The reads of its block were joined as far as they can be.
+pub(super) const JOINED: u8 = 64;
+/// It was joined of others, and has not been answered since.
+pub(super) const TRIAL: u8 = 128;
 
 /// One request that the plan repeats, and its result. (The changing fields are cells, because
 /// the reads of a unit change each other.)

@@ -16,6 +16,11 @@ use core::cell::Cell;
 const GATEWAY_PATH_UNAVAILABLE: Status = Status::exception(0x0A);
 const GATEWAY_TARGET_FAILED_TO_RESPOND: Status = Status::exception(0x0B);
 
+/// A plan whose reads stay as they are.
+struct Whole;
+/// A plan that divides the reads that a device refuses.
+struct Divided;
+
 /// How long the plan leaves a unit alone that does not answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Backoff {
@@ -148,6 +153,31 @@ impl Schedule {
         now: u32,
         backoff: &Backoff,
     ) -> bool {
+        self.note_end::<Whole>(reads, read, status, now, backoff)
+    }
+
+    /// As [`Schedule::end`], in a plan that divides its reads.
+    pub fn end_divided(
+        &self,
+        reads: &[Read],
+        read: &Read,
+        status: Status,
+        now: u32,
+        backoff: &Backoff,
+    ) -> bool {
+        self.note_end::<Divided>(reads, read, status, now, backoff)
+    }
+
+    /// See [`Schedule::end`]. Each kind of plan has a copy of its own: the compiler puts it into its
+    /// only caller, which takes less firmware.
+    fn note_end<Kind>(
+        &self,
+        reads: &[Read],
+        read: &Read,
+        status: Status,
+        now: u32,
+        backoff: &Backoff,
+    ) -> bool {
         let mut flags = read.flags.get() & !QUEUED;
         if status == Status::OK {
             flags |= HAS_DATA;
@@ -195,7 +225,7 @@ impl Schedule {
             self.wake.set(now);
         }
         if before | state != 0 {
-            settle(reads, read, before, state);
+            settle::<Kind>(reads, read, before, state);
         }
         state & !before & SUSPENDED != 0
     }
@@ -238,7 +268,14 @@ impl Schedule {
         }
     }
 
+    /// Takes reads into account that were cut, joined or moved, or that wait.
+    #[inline(never)]
+    pub fn renew(&self, reads: &[Read], now: u32) {
+        self.gather(reads, now);
+    }
+
     /// Makes the heap anew, of the reads that need not wait.
+    #[inline(always)] // `renew` is for few.
     fn gather(&self, reads: &[Read], now: u32) {
         self.root.set(NONE);
         self.wake.set(now.wrapping_add(FOREVER));
@@ -251,7 +288,8 @@ impl Schedule {
 }
 
 /// Passes to the other reads of its unit whether the unit is silent.
-fn settle(reads: &[Read], read: &Read, before: u8, state: u8) {
+#[expect(clippy::extra_unused_type_parameters)] // As of `Schedule::note_end`.
+fn settle<Kind>(reads: &[Read], read: &Read, before: u8, state: u8) {
     let (mut first, mut all) = (read, 0);
     for other in reads.iter().filter(|other| other.unit == read.unit) {
         let mut flags = other.flags.get() & !(SUSPENDED | DOUBTED | HELD) | state;
@@ -278,6 +316,7 @@ fn settle(reads: &[Read], read: &Read, before: u8, state: u8) {
 }
 
 /// True if the unit itself, or the gateway before it, shows that it does not answer.
+#[inline(always)] // It is called in one place of each kind of plan.
 fn is_silence(status: Status) -> bool {
     matches!(
         status,

@@ -5,12 +5,14 @@ mod conversion;
 mod object;
 mod poll;
 mod setup;
+mod split;
 mod values;
 
 pub use begin::*;
 pub use conversion::*;
 pub use poll::*;
 pub use setup::*;
+pub use split::*;
 pub use values::*;
 
 use core::ffi::c_void;

@@ -56,7 +56,7 @@ pub unsafe extern "C" fn mbm_plan_poll(plan: *mut mbm_plan) -> u8 {
 ///
 /// # Safety
 /// The request is one of a begun plan.
-unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
+pub(super) unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
     // SAFETY: `queue` sets it, and mbm_plan_begin resets it.
     unsafe { (*request).context.cast::<Read>().as_ref() }
 }
@@ -65,7 +65,7 @@ unsafe fn read_of<'a>(request: *const mbm_clientRequest) -> Option<&'a Read> {
 ///
 /// # Safety
 /// `object` is begun, with this request and this read. The request is not pending.
-unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &Read) {
+pub(super) unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &Read) {
     // The data of a read lie within the plan's words.
     (*request).done = None;
     (*request).reply = (*object).setup().data.add(read.offset.into()).cast();
@@ -91,7 +91,8 @@ unsafe fn queue(object: *const Object, request: *mut mbm_clientRequest, read: &R
 /// # Safety
 /// `plan` is begun; no reference into it lives, for `update` may use it, begin it again,
 /// end it and zero it.
-unsafe fn update(plan: *mut mbm_plan, ended: *const Read, is_of_unit: bool) -> bool {
+#[inline(always)] // Of two callers a program has one.
+pub(super) unsafe fn update(plan: *mut mbm_plan, ended: *const Read, is_of_unit: bool) -> bool {
     // Looked at again after every call of `update`.
     let object = pointers::object(plan);
     let begins = (*object).begins;

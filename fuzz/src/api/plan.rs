@@ -226,8 +226,24 @@ fn look(w: &World, plan: *mut mbm_plan) {
 
 /// Polls a plan and its client in turns, while time passes.
 fn run(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
+    let splits = w.byte() & 1 == 0;
+    // A plan has at most nine fields.
+    let blocks = w.null_or(32, || w.block(9 * size_of::<u16>(), 2).cast());
+    let splitting = w.put(mbm_planSplitting {
+        blocks,
+        retryMs: w.word().into(),
+        triedAt: 0,
+        readCount: 0,
+        begins: 0,
+        state: 0,
+    });
+    let splitting = w.null_or(32, || splitting);
     for _ in 0..1 + w.byte() % 16 {
-        checked!(w, mbm_plan_poll(plan));
+        if splits {
+            checked!(w, mbm_plan_pollSplitting(plan, splitting));
+        } else {
+            checked!(w, mbm_plan_poll(plan));
+        }
         let status = call!(w, mbm_client_poll(client));
         if status != OK && status != PENDING {
             break;

@@ -1,0 +1,233 @@
+/* A plan that divides the reads that a device refuses, over a port in memory with a clock of its
+ * own. tests/plan_splitting.rs has random devices. */
+#include "plan_device.h"
+#include "test.h"
+
+enum { COILS = MBM_TABLE_COILS, HOLDING = MBM_TABLE_HOLDING_REGISTERS, SECOND = 1000 };
+enum { RETRY = 600 * SECOND };
+
+static plan_device d;
+static uint16_t blocks[PLAN_FIELDS];
+
+static void splitting(int is_tcp)
+{
+    plan_device_begin(&d, is_tcp);
+    d.splitting.blocks = blocks;
+}
+
+static void rtu(void)
+{
+    splitting(0);
+}
+
+fixture each_test = {rtu, NULL};
+
+/* Fields of one register from address 0 on. */
+static void add_registers(uint16_t count)
+{
+    for (uint16_t i = 0; i < count; i++)
+        (void)plan_device_add(&d, 1, HOLDING, MBM_TYPE_UINT16, i, SECOND);
+}
+
+static uint8_t status(uint16_t field)
+{
+    return mbm_plan_getStatus(&d.plan, field, NULL);
+}
+
+/* All fields are read but those that the device lacks. */
+static void expect_found(void)
+{
+    for (uint16_t i = 0; i < d.setup.fieldCount; i++) {
+        const uint16_t address = d.fields[i].address;
+
+        IS(d.lacks[address] ? MBM_ILLEGAL_DATA_ADDRESS : MBM_OK, status(i));
+        if (!d.lacks[address] && d.fields[i].table == HOLDING)
+            assert_int_equal(plan_device_integer(&d, i, 0), d.registers[address]);
+        if (!d.lacks[address] && d.fields[i].table == COILS)
+            assert_int_equal(plan_device_integer(&d, i, 0), d.registers[address] & 1);
+    }
+}
+
+static unsigned reads(void)
+{
+    mbm_planReadInfo read;
+    uint16_t count = 0;
+
+    while (mbm_plan_getRead(&d.plan, count, &read) == MBM_OK)
+        count++;
+    return count;
+}
+
+TEST(a_register_that_the_device_lacks_is_found_and_the_others_are_read_together)
+{
+    add_registers(16);
+    d.lacks[5] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    expect_found();
+    assert_int_equal(reads(), 3);
+    const unsigned before = d.requested;
+    plan_device_run(&d, 10 * SECOND);
+    assert_int_equal(d.requested - before, 20);
+    expect_found();
+}
+
+TEST(only_the_field_that_is_not_there_is_told_of_an_exception)
+{
+    add_registers(16);
+    d.lacks[5] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    for (unsigned i = 0; i < d.updated; i++)
+        IS(d.updates[i].field == 5 ? MBM_ILLEGAL_DATA_ADDRESS : MBM_OK, d.updates[i].status);
+    assert_int_equal(plan_device_updates(&d, 5), 1);
+}
+
+TEST(a_field_is_tried_again_after_ten_minutes_and_read_with_the_others_if_it_is_there)
+{
+    add_registers(16);
+    d.lacks[5] = 1;
+    for (uint16_t i = 0; i < 16; i++)
+        d.fields[i].intervalMs = 60 * SECOND;
+    plan_device_start(&d);
+    plan_device_run(&d, RETRY - 5 * SECOND);
+    assert_int_equal(plan_device_updates(&d, 5), 1);
+    d.lacks[5] = 0;
+    plan_device_run(&d, 125 * SECOND);
+    expect_found();
+    assert_int_equal(reads(), 1);
+    /* The device loses another one. */
+    d.lacks[12] = 1;
+    plan_device_run(&d, 125 * SECOND);
+    expect_found();
+}
+
+TEST(the_time_until_the_next_try_is_a_setting)
+{
+    add_registers(4);
+    d.lacks[2] = 1;
+    d.splitting.retryMs = 3 * SECOND;
+    plan_device_start(&d);
+    plan_device_run(&d, 10 * SECOND);
+    assert_in_range(plan_device_updates(&d, 2), 3, 4);
+    expect_found();
+}
+
+TEST(a_device_that_refuses_long_reads_is_read_in_shorter_ones)
+{
+    add_registers(16);
+    d.longest = 10;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    expect_found();
+    assert_int_equal(reads(), 2);
+    const unsigned before = d.requested;
+    plan_device_run(&d, 10 * SECOND);
+    assert_int_equal(d.requested - before, 20);
+}
+
+TEST(coils_are_found_too_and_keep_their_values)
+{
+    for (uint16_t i = 0; i < 16; i++)
+        (void)plan_device_add(&d, 1, COILS, MBM_TYPE_BIT, (uint16_t)(3 + i), SECOND);
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    expect_found();
+    d.lacks[9] = d.lacks[17] = 1;
+    plan_device_run(&d, 2 * SECOND);
+    expect_found();
+    for (uint16_t i = 0; i < 16; i++)
+        assert_int_equal(plan_device_integer(&d, i, 0), d.registers[3 + i] & 1);
+}
+
+TEST(several_requests_in_flight_change_nothing)
+{
+    splitting(1);
+    OK(mbm_client_setInFlight(&d.client, 4));
+    d.setup.requestCount = 4;
+    add_registers(16);
+    for (uint16_t i = 0; i < 16; i++) {
+        d.fields[i].address = (uint16_t)(i + i / 4 * 10);
+        d.fields[i].intervalMs = 60 * SECOND;
+    }
+    d.lacks[1] = d.lacks[2] = d.lacks[17] = d.lacks[45] = 1;
+    plan_device_start(&d);
+    assert_int_equal(reads(), 4);
+    plan_device_run(&d, 20 * SECOND);
+    expect_found();
+    memset(d.lacks, 0, sizeof d.lacks);
+    plan_device_run(&d, RETRY);
+    plan_device_run(&d, 125 * SECOND);
+    expect_found();
+    assert_int_equal(reads(), 4);
+}
+
+TEST(without_storage_a_refused_read_stays_one)
+{
+    add_registers(4);
+    d.lacks[2] = 1;
+    d.setup.readCount = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 2500);
+    for (uint16_t i = 0; i < 4; i++)
+        IS(MBM_ILLEGAL_DATA_ADDRESS, status(i));
+    assert_int_equal(reads(), 1);
+    assert_int_equal(d.requested, 3);
+}
+
+TEST(fields_that_were_grouped_before_need_storage_for_more_reads)
+{
+    const uint16_t counts[1] = {8};
+
+    add_registers(8);
+    d.lacks[2] = 1;
+    d.setup.readCount = 1;
+    d.splitting.readCount = 8;
+    OK(mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, NULL));
+    plan_device_run(&d, 900);
+    expect_found();
+    assert_int_equal(reads(), 3);
+}
+
+TEST(a_plan_that_begins_again_has_found_nothing)
+{
+    add_registers(8);
+    d.lacks[2] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    expect_found();
+    d.lacks[2] = 0;
+    plan_device_start(&d);
+    assert_int_equal(reads(), 1);
+    plan_device_run(&d, 900);
+    expect_found();
+    assert_int_equal(reads(), 1);
+}
+
+TEST(a_bit_and_its_register_are_found_as_one)
+{
+    for (unsigned i = 0; i < 4; i++) {
+        (void)plan_device_add(&d, 1, HOLDING, MBM_TYPE_UINT16, (uint16_t)i, SECOND);
+        plan_device_add(&d, 1, HOLDING, MBM_TYPE_BIT, (uint16_t)i, SECOND)->bit = 3;
+    }
+    d.lacks[2] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    for (uint16_t i = 0; i < 8; i++)
+        IS(i / 2 == 2 ? MBM_ILLEGAL_DATA_ADDRESS : MBM_OK, status(i));
+    assert_int_equal(reads(), 3);
+}
+
+TEST(a_silent_unit_is_left_alone_while_it_is_searched)
+{
+    add_registers(8);
+    d.lacks[2] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 20);
+    d.answers[1] = SILENT;
+    plan_device_run(&d, 10 * SECOND);
+    assert_in_range(d.requested, 3, 12);
+    d.answers[1] = ANSWERS;
+    plan_device_run(&d, 20 * SECOND);
+    expect_found();
+}
