@@ -3,5 +3,4 @@ fn main() {
         .file("src/callgrind.c")
         .compile("callgrind");
     println!("cargo:rerun-if-changed=src/callgrind.c");
-    println!("cargo:rustc-link-lib=modbus");
 }

@@ -1,41 +1,20 @@
 //! The same requests for a libmodbus server and for mbm's decoder: both must accept and refuse
 //! the same, and mbm must be able to read libmodbus's responses.
 
+#[path = "../../../tests/common/libmodbus.rs"]
+mod functions;
+
 use crate::naive;
+use functions::*;
 use mbm::error::Error;
 use mbm::frame::{rtu, tcp, Adu};
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
-use std::ffi::{c_char, c_int, c_uint, c_void};
+use std::ffi::{c_uint, c_void};
 use std::io::{Read, Write};
 use std::net::Shutdown;
 use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
-
-#[link(name = "modbus")]
-extern "C" {
-    fn modbus_new_tcp(address: *const c_char, port: c_int) -> *mut c_void;
-    fn modbus_new_rtu(
-        device: *const c_char,
-        baud: c_int,
-        parity: c_char,
-        data_bits: c_int,
-        stop_bits: c_int,
-    ) -> *mut c_void;
-    fn modbus_set_slave(context: *mut c_void, slave: c_int) -> c_int;
-    fn modbus_set_socket(context: *mut c_void, socket: c_int) -> c_int;
-    fn modbus_set_response_timeout(context: *mut c_void, s: u32, us: u32) -> c_int;
-    fn modbus_receive(context: *mut c_void, request: *mut u8) -> c_int;
-    fn modbus_reply(
-        context: *mut c_void,
-        request: *const u8,
-        length: c_int,
-        mapping: *mut c_void,
-    ) -> c_int;
-    fn modbus_mapping_new(bits: c_int, inputs: c_int, words: c_int, input: c_int) -> *mut c_void;
-    fn modbus_free(context: *mut c_void);
-    fn modbus_mapping_free(mapping: *mut c_void);
-}
 
 struct Server {
     context: *mut c_void,
@@ -44,18 +23,13 @@ struct Server {
 
 impl Server {
     fn new(over_tcp: bool, unit: u8) -> Server {
-        // SAFETY: the strings end with a zero; libmodbus copies them.
+        let context = context(over_tcp, unit);
+        // SAFETY: the context is alive.
         unsafe {
-            let context = if over_tcp {
-                modbus_new_tcp(c"127.0.0.1".as_ptr(), 1502)
-            } else {
-                modbus_new_rtu(c"/dev/null".as_ptr(), 9600, b'N' as c_char, 8, 1)
-            };
             let mapping = modbus_mapping_new(65536, 65536, 65536, 65536);
-            assert!(!context.is_null() && !mapping.is_null());
+            assert!(!mapping.is_null());
             // libmodbus sleeps for the response timeout when it refuses a quantity.
             assert_eq!(modbus_set_response_timeout(context, 0, 1), 0);
-            assert_eq!(modbus_set_slave(context, c_int::from(unit)), 0);
             Server { context, mapping }
         }
     }
