@@ -66,22 +66,23 @@ enum { FAULT_OWN_COUNT = 0x10000, FAULT_NUMBER_BEFORE };
     "  wrong-length    a wrong byte count; on TCP a wrong length in the header\n"                  \
     "  close           closes the connection instead (tcp://, rtu+tcp://, tls://)\n"               \
     "Devices as they are:\n"                                                                       \
-    "  unit=N          answers with unit N\n"                                                      \
-    "  transaction=N   answers with transaction number N; count: its own count; before: the "      \
-    "number of the request before\n"                                                               \
-    "  only-function=N, no-function=N  exception 01 for the others, or for this one\n"             \
-    "  most-registers=N, most-bits=N, hole=A-B  exception 02 for a request of more, or of an "     \
-    "address from A to B\n"                                                                        \
-    "  refused-with=N  that exception in place of 02\n"                                            \
-    "  needs-delay=TIME         drops the requests of a connection's first time\n"                 \
+    "  unit=N            answers with unit N\n"                                                    \
+    "  transaction=N     answers with transaction number N; =count: with its own\n"                \
+    "                    count; =before: with that of the request before\n"                        \
+    "  only-function=N   exception 01 for all other functions; several add up\n"                   \
+    "  no-function=N     exception 01 for this function; several add up\n"                         \
+    "  most-registers=N  exception 02 for a request of more; most-bits=N too\n"                    \
+    "  hole=A-B          exception 02 for a request of an address from A to B\n"                   \
+    "  refused-with=N    exception N in place of 02\n"                                             \
+    "  needs-delay=TIME  drops the requests of a connection's first time\n"                        \
     "  needs-message-wait=TIME  drops a request without that pause before it\n"                    \
-    "  one-request     drops the requests that come while it answers another one\n"                \
-    "  busy            exception 06 for what these three drop\n"                                   \
-    "  close-idle=TIME, close-after=N, deaf-after=N  closes a connection without requests, or "    \
-    "after N answers; or answers no more on it\n"                                                  \
-    "  connections=N   closes further connections at once\n"                                       \
-    "The last six have no @. udp:// has no bytes, only datagrams: without slow, blocks, damaged, " \
-    "cut, noise, wrong-length and what is about connections.\n"
+    "  one-request       drops what comes while it answers another request\n"                      \
+    "  busy              exception 06 for what these three drop\n"                                 \
+    "  close-idle=TIME   closes a connection without bytes for that time\n"                        \
+    "  close-after=N     closes a connection after N answers\n"                                    \
+    "  deaf-after=N      answers no more on a connection after N answers\n"                        \
+    "  connections=N     closes further connections at once\n"                                     \
+    "The words one-request, busy and the last four have no @. udp:// has late, deaf, twice, exception, foreign, and what is neither about connections nor one-request.\n"
 
 enum { FAULT_MOST = 32 };
 

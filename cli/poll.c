@@ -99,7 +99,9 @@ static const struct argp_option texts[] = {
     {"watch", WATCH, NULL, 0,
      "Show a table that stays in its place, with changes, minimum and maximum; q ends it", 3},
     {"http", HTTP, "[ADDRESS:]PORT", 0,
-     "Show the same on a page, with a chart, at 127.0.0.1 or another address of this machine", 3},
+     "Show values, changes and a chart on a page at 127.0.0.1, or at another address of this "
+     "machine",
+     3},
     {"show-plan", SHOW_PLAN, NULL, 0, "First print the requests of the plan to stderr", 3},
     {0}};
 
