@@ -112,6 +112,12 @@ static void make_pieces(fault_port *port, const uint8_t *answer, uint16_t length
         add_piece(port, 0, frame, count);
 }
 
+static void lose(fault_port *port)
+{
+    port->is_lost = 1;
+    fault_port_end(port);
+}
+
 /* --- requests that a device drops while it answers another one --- */
 
 /* Notes the answer to a request that was dropped, if the device says that it is busy. */
@@ -135,7 +141,8 @@ static void refuse(fault_port *port)
 }
 
 /* Walks over received bytes of Modbus TCP, and moves those of the frames that are not dropped to
- * the front. Returns how many they are. All but the first frame are dropped, or all. */
+ * the front. Returns how many they are. `drops` is about the frames that begin here; the server
+ * asks for the bytes of one frame. */
 static uint16_t pass(fault_port *port, uint8_t *bytes, uint16_t count, int drops)
 {
     fault_walk *walk = &port->walk;
@@ -160,7 +167,6 @@ static uint16_t pass(fault_port *port, uint8_t *bytes, uint16_t count, int drops
             continue;
         if (walk->drops)
             refuse(port);
-        drops = 1;
         walk->have = 0;
     }
     return passed;
@@ -180,16 +186,10 @@ static void drop_requests(fault_port *port)
             (void)pass(port, bytes, (uint16_t)count, 1);
     }
     if (count < 0)
-        port->is_lost = 1;
+        lose(port);
 }
 
 /* --- sending --- */
-
-static void lose(fault_port *port)
-{
-    port->is_lost = 1;
-    fault_port_end(port);
-}
 
 /* How many bytes are handed over at once: all as long as there are no blocks, and the time from
  * one block to the next in microseconds. */

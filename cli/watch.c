@@ -214,7 +214,10 @@ static void draw_field(watch *w, drawing *d, uint16_t field)
     put_column(d, MOST, one->has_number ? one->most_text : "");
     if (is_wrong)
         style(d, WRONG);
-    put_column(d, STATUS, polled_status(of, code, status));
+    /* Why the link was lost says more in a few columns than that it was. */
+    put_column(d, STATUS,
+               code == MBM_LINK_LOST && line_reason(&of->at) ? line_reason(&of->at)
+                                                             : polled_status(of, code, status));
     end_line(d);
 }
 

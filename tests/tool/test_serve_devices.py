@@ -185,11 +185,20 @@ def test_a_device_takes_one_request_at_a_time(client):
 
 
 def test_a_busy_device_hears_others_when_a_client_leaves_during_its_answer(client):
-    device = client("one-request", "late=1s@1", "busy")
+    device = client("one-request", "late=10m@1", "busy")
     device.send(1)
     other = device.again()
+    assert other.ask(1) == BUSY
     device.socket.close()
     assert wait(lambda: other.ask(1) == number(0))
+
+
+def test_a_busy_device_says_so_between_frames(client):
+    device = client("one-request", "slow=30ms@1", "busy")
+    device.send(1)
+    first = device.read(1)
+    device.send(1)
+    assert first + device.read(10) == tcp_frame(1, 1, number(0)) and device.response() == (2, 1, BUSY)
 
 
 def test_requests_that_a_device_drops_may_come_in_pieces(client):
