@@ -183,54 +183,30 @@ impl<L: Transport<Task>> Requester<L> {
         assert_eq!(raw.received().get(4..), Some(&b"\x01\x02\x05V2.11"[..]));
     }
 
+    fn reads(&mut self, function: FunctionSpec, address: u16, quantity: u16, expected: &[u8]) {
+        self.expect_data(&[], |o| o.set(function, address, quantity), expected);
+    }
+
+    fn writes(&mut self, function: FunctionSpec, address: u16, value: u16, data: &[u8]) {
+        self.expect_status(data, |o| o.set(function, address, value), Status::OK);
+    }
+
     fn registers_and_bits(&mut self) {
         let words: Vec<u8> = (7..132).flat_map(pattern).collect();
-        self.expect_data(
-            &[],
-            |o| o.set(FunctionSpec::READ_HOLDING_REGISTERS, 7, 125),
-            &words,
-        );
+        self.reads(FunctionSpec::READ_HOLDING_REGISTERS, 7, 125, &words);
         let others: Vec<u8> = words.iter().map(|byte| !byte).collect();
-        self.expect_data(
-            &[],
-            |o| o.set(FunctionSpec::READ_INPUT_REGISTERS, 7, 125),
-            &others,
-        );
+        self.reads(FunctionSpec::READ_INPUT_REGISTERS, 7, 125, &others);
         let bit = |address| pattern(address)[1] >> 7;
         let coils = (0..8).fold(0, |byte, i| byte | bit(30 + i) << i);
-        self.expect_data(
-            &[],
-            |o| o.set(FunctionSpec::READ_COILS, 30, 9),
-            &[coils, bit(38)],
-        );
+        self.reads(FunctionSpec::READ_COILS, 30, 9, &[coils, bit(38)]);
         let inputs = [!coils, 1 - bit(38)];
-        self.expect_data(
-            &[],
-            |o| o.set(FunctionSpec::READ_DISCRETE_INPUTS, 30, 9),
-            &inputs,
-        );
-        self.expect_status(
-            &[],
-            |o| o.set(FunctionSpec::WRITE_SINGLE_COIL, 30, 0xFF00),
-            Status::OK,
-        );
-        self.expect_status(
-            &[0b101],
-            |o| o.set(FunctionSpec::WRITE_MULTIPLE_COILS, 31, 3),
-            Status::OK,
-        );
-        self.expect_data(&[], |o| o.set(FunctionSpec::READ_COILS, 30, 4), &[0b1011]);
-        self.expect_status(
-            &[],
-            |o| o.set(FunctionSpec::WRITE_SINGLE_REGISTER, 9, 0xBEEF),
-            Status::OK,
-        );
+        self.reads(FunctionSpec::READ_DISCRETE_INPUTS, 30, 9, &inputs);
+        self.writes(FunctionSpec::WRITE_SINGLE_COIL, 30, 0xFF00, &[]);
+        self.writes(FunctionSpec::WRITE_MULTIPLE_COILS, 31, 3, &[0b101]);
+        self.reads(FunctionSpec::READ_COILS, 30, 4, &[0b1011]);
+        self.writes(FunctionSpec::WRITE_SINGLE_REGISTER, 9, 0xBEEF, &[]);
         let data = [1, 2, 3, 4];
-        self.expect_status(
-            &data,
-            |o| o.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 10, 2),
-            Status::OK,
-        );
+        self.writes(FunctionSpec::WRITE_MULTIPLE_REGISTERS, 10, 2, &data);
         self.expect_status(
             &[],
             |o| o.mask_write_register(11, 0xFF00, 0x0025),
