@@ -5,7 +5,8 @@
  *     device poll HOST PORT     reads every field once, and prints the values of each in a line
  *     device serve PORT         serves the values of the device file; PORT 0 takes a free one
  *
- * HEADER is the header in quotes, UPPER and LOWER are the device's name in C.
+ * HEADER is the header in quotes, UPPER and LOWER are the device's name in C. CONVERSIONS is
+ * defined if the header has any.
  *
  * Licence: MIT OR Apache-2.0. */
 #define JOIN(one, other) one##_##other
@@ -52,6 +53,21 @@ static int is_every_field_read(void)
     return 1;
 }
 
+/* Returns 0 if the header has no conversion for the field. */
+static int get_converted(uint16_t field, uint16_t index, double *number)
+{
+#ifdef CONVERSIONS
+    const mbm_planConversion *with = NAME(LOWER, conversions)[field];
+
+    return with && mbm_plan_getConverted(&plan, field, index, with, number) == MBM_OK;
+#else
+    (void)field;
+    (void)index;
+    (void)number;
+    return 0;
+#endif
+}
+
 static void print_field(uint16_t field)
 {
     const mbm_planField *of = &NAME(LOWER, fields)[field];
@@ -72,7 +88,9 @@ static void print_field(uint16_t field)
         return;
     }
     for (i = 0; i < count; i++) {
-        if (of->divisor == 0 && mbm_plan_getInteger(&plan, field, i, &integer) == MBM_OK)
+        if (get_converted(field, i, &number))
+            printf("%.17g", number);
+        else if (of->divisor == 0 && mbm_plan_getInteger(&plan, field, i, &integer) == MBM_OK)
             printf("%lld", (long long)integer);
         else if (mbm_plan_getNumber(&plan, field, i, &number) == MBM_OK)
             printf("%.17g", number);

@@ -267,7 +267,8 @@ static void on_update(void *context, mbm_plan *ended, uint16_t field)
     update_unit(l, field, mbm_plan_getStatus(ended, field, NULL));
     if (is_new)
         publish_value(l, field);
-    update_scaled(l, field);
+    if (l->table->fields.fields[field].is_power)
+        update_scaled(l, field);
 }
 
 static const discovery_line *discovery_of(const bridge_line *l)

@@ -60,6 +60,7 @@ typedef struct device_field {
      * scale of `form` is then the power that the file gives that field. */
     char *power_name, *power_plain; /* as in the file; in a repetition without its number too */
     int power_field;
+    uint8_t is_power;       /* it is the power of ten of another field */
     const void *late_value; /* for device_file.c */
 } device_field;
 

@@ -354,6 +354,7 @@ int device_values_find_power(yaml_file *file, device *of, uint16_t field)
         return yaml_file_refuse_line(file, one->scale_line, "scale: the field %s in line %d %s",
                                      of->fields[power].name, of->fields[power].line, wrong);
     one->power_field = power;
+    of->fields[power].is_power = 1;
     one->form.scale = conversion_power(power_in_file(of, (uint16_t)power));
     return 1;
 }

@@ -239,6 +239,37 @@ static void write_shared(const header *h)
         }
 }
 
+/* Whether the header has a conversion for a field. */
+static int has_constant(const header *h, uint16_t at)
+{
+    return is_converted(&h->of->fields[at]) && h->of->planned[at].type <= MBM_TYPE_TEXT;
+}
+
+/* Writes the conversions in the order of the fields of the plan. */
+static void write_table(const header *h)
+{
+    uint16_t i;
+
+    fprintf(h->out,
+            "\n/* The conversions of all fields of the plan, NULL for those that have none. */\n"
+            "static const mbm_planConversion *const %s_conversions[%s_FIELDS] = {\n",
+            h->lower, h->upper);
+    for (i = 0; i < h->of->readable; i++) {
+        const uint16_t at = h->order[i];
+        const char *comma = i + 1 < h->of->readable ? "," : "";
+        char *lower = header_lower(h->fields[at]);
+
+        if (!has_constant(h, at))
+            fprintf(h->out, "    NULL%s\n", comma);
+        else if (is_standard_only(&h->of->fields[at]))
+            fprintf(h->out, "    &%s_standard%s\n", h->lower, comma);
+        else
+            fprintf(h->out, "    &%s_%s_conversion%s\n", h->lower, lower ? lower : "", comma);
+        free(lower);
+    }
+    fprintf(h->out, "};\n");
+}
+
 int header_write_conversions(header *h)
 {
     int is_first = 1;
@@ -247,18 +278,20 @@ int header_write_conversions(header *h)
     for (i = 0; i < h->of->readable; i++) {
         const uint16_t at = h->order[i];
 
-        if (!is_converted(&h->of->fields[at]) || h->of->planned[at].type > MBM_TYPE_TEXT)
+        if (!has_constant(h, at))
             continue;
-        if (is_first)
+        if (is_first) {
             fprintf(h->out,
                     "\n/* What the numbers of these fields mean, and functions that get their "
                     "values: as a double, and\n * times 10^decimals. They return "
                     "MBM_NOT_AVAILABLE if the device has no value. */\n");
-        if (is_first)
             write_shared(h);
+        }
         is_first = 0;
         if (!write_field(h, at))
             return 0;
     }
+    if (!is_first)
+        write_table(h);
     return 1;
 }

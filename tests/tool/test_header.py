@@ -47,11 +47,17 @@ def header_of(mbm, folder, file, name):
     return header
 
 
+def conversions_of(header, lower):
+    with open(header) as file:
+        return ["-DCONVERSIONS"] if f"{lower}_conversions" in file.read() else []
+
+
 @pytest.fixture
 def served(mbm, folder, compiled, file, name):
     """A device: the port of mbm serve, the rows of mbm poll, the program that is made with the header, and the header."""
     header, lower = header_of(mbm, folder, file, name), name.lower()
-    program = compiled("device", f'-DHEADER="{lower}.h"', f"-DUPPER={name}", f"-DLOWER={lower}", f"-D{name}_PLAN", f"-D{name}_SERVER")
+    program = compiled("device", f'-DHEADER="{lower}.h"', f"-DUPPER={name}", f"-DLOWER={lower}", f"-D{name}_PLAN", f"-D{name}_SERVER",
+                       *conversions_of(header, lower))
     port = mbm.serve("tcp://127.0.0.1:0", file).rsplit(":", 1)[1]
     return port, polled(mbm, port, file), program, header
 
@@ -107,11 +113,8 @@ def is_near(one, other):
 
 
 @each(DEVICES)
-def test_a_client_made_with_a_header_reads_what_poll_reads(served, file, name):
+def test_a_client_made_with_a_header_reads_what_poll_reads(served, name):
     port, rows, program, header = served
-    # The program prints numbers without the power of ten that another field has.
-    values = {row["name"]: row["value"] for row in rows}
-    powers = {field["name"]: values[field["scale"]] for field in described(file) if field.get("scale") in values}
     done = run(program, "poll", "127.0.0.1", port)
     printed = done.out.splitlines()
     assert (done.code, len(printed)) == (0, len(rows)), done.error
@@ -119,7 +122,7 @@ def test_a_client_made_with_a_header_reads_what_poll_reads(served, file, name):
     with open(header, encoding="utf-8") as text:
         printed = dict(zip(re.findall(r"^    /\* (\w+) \*/$", text.read(), re.M), printed, strict=True))
     for row in rows:
-        value = row["value"] if isinstance(row["value"], (str, list)) else [row["value"] / 10 ** powers.get(row["name"], 0)]
+        value = row["value"] if isinstance(row["value"], (str, list)) else [row["value"]]
         text = printed[f"{name}_{re.sub('[^A-Z0-9]+', '_', row['name'].upper())}"]
         # A text of the device is in Latin-1.
         assert is_near(text if isinstance(value, str) and value.isascii() else value if isinstance(value, str) else as_numbers(text), value), row
