@@ -309,6 +309,48 @@ def test_mbm_libmodbus_and_pymodbus_suffer_from_a_device_as_they_do(mbm, playing
         assert outcome(lambda: master.read_holding_registers(0, count=2, device_id=1)) == by_pymodbus
 
 
+def test_masters_write_to_a_device_that_has_function_16_only(mbm, playing):
+    place = playing("no-function=6")
+    assert mbm("write", place, 0, 5, *PATIENT).code == EXCEPTION
+    assert mbpoll(place, 1, "-t", "4", "-r", "0", values=[5]) == "Illegal function"
+    master = pymodbus_client(place)
+    assert outcome(lambda: master.write_register(0, 5)) == "exception 01"
+    assert "exception" not in outcome(lambda: master.write_registers(0, [5])) and outcome(lambda: master.read_holding_registers(0, count=1)) == [5]
+    # Two values go by function 16.
+    assert mbm("write", place, 0, 6, 7, *PATIENT).code == DONE
+    assert mbpoll(place, 1, "-t", "4", "-r", "0", values=[8, 9]) == "done"
+    mbm.prints("    0  8\n    1  9\n", "read", place, 0, 2)
+
+
+def test_masters_meet_a_device_that_has_its_connection_taken(mbm, playing):
+    place = playing("connections=1")
+    holder = Client(port_of(place))
+    assert holder.ask(1) == number(0)
+    assert mbm("read", place, 0, "--timeout", "1s").code == LINE
+    assert mbpoll(place, 1, "-t", "4", "-r", "0", "-c", "1") == "Connection reset by peer"
+    master = pymodbus_client(place, 1)
+    assert outcome(lambda: master.read_holding_registers(0, count=1)) == NOTHING
+    assert holder.ask(1) == number(0)
+
+
+def test_masters_that_do_not_pause_meet_a_busy_device(mbm, playing):
+    place = playing("needs-message-wait=30s", "busy")
+    assert mbm("read", place, 0, *PATIENT).code == DONE
+    assert mbm("read", place, 0, *PATIENT).code == EXCEPTION
+    assert mbpoll(place, 1, "-t", "4", "-r", "0", "-c", "1") == "Slave device or server is busy"
+    assert outcome(lambda: pymodbus_client(place).read_holding_registers(0, count=1)) == "exception 06"
+
+
+def test_a_device_that_takes_one_request_loses_those_that_are_in_flight_beside_it(mbm, playing):
+    place = playing("one-request", "late=200ms")
+    code, _, error = mbm("read", place, 0, 300, "--in-flight", 4, "--timeout", "2s")
+    assert code == NO_REPLY and "try --in-flight 1" in error
+    assert mbm("read", place, 0, 300, *PATIENT).code == DONE
+    # The others have one request in flight.
+    assert mbpoll(place, 1, "-o", "10", "-t", "4", "-r", "0", "-c", "1") == ["0"]
+    assert outcome(lambda: pymodbus_client(place).read_holding_registers(0, count=1)) == [0]
+
+
 def test_rounds_of_mbm_get_along_with_a_device_that_closes_and_goes_deaf(mbm, playing):
     code, out, error = mbm("read", playing("close-idle=300ms"), 0, "--every", "600ms", "--times", 4, "--csv", *PATIENT)
     assert code == DONE and out.count(",success,") == 4, out + error
