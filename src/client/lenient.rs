@@ -11,8 +11,8 @@
 use super::request::ClientRequest;
 use super::serial::Serial;
 use super::storage::ClientStorage;
-use super::transaction::ClientEngine;
-use crate::engine::{Finding, Moment};
+use super::transaction::{ClientEngine, ClientTransaction};
+use crate::engine::{Extension, Finding, Moment};
 use crate::frame::rtu;
 use crate::port::Port;
 
@@ -21,23 +21,20 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// count, or that repeats another address or value than a write. For RTU frames: ASCII frames stay
     /// as strict as they are.
     pub fn set_lenient(&mut self, is_lenient: bool) {
-        match is_lenient {
-            true => self.engine.extras = Some(extend),
-            false => self.engine.use_extras(),
-        }
+        let lenient = match is_lenient {
+            true => Some(extend as Extension<P, S, ClientTransaction<P, S, J>>),
+            false => None,
+        };
+        self.engine.set_lenient(lenient);
     }
 }
 
-/// See [`crate::engine::Extension`].
+/// See [`Extension`].
 fn extend<P: Port, S: ClientStorage, J: ClientRequest>(
     engine: &mut ClientEngine<P, S, J>,
     moment: Moment,
 ) -> bool {
-    let is_deviating = match moment {
-        Moment::Missed => accept_deviating(engine),
-        _ => false,
-    };
-    is_deviating || engine.extras(moment)
+    moment == Moment::Missed && accept_deviating(engine)
 }
 
 /// Makes the deviating reply that ends with the last byte the result, if there is one.

@@ -77,7 +77,6 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     };
     const HAS_FIXED_REPLY: bool = false;
     const IS_REPEATED: bool = false;
-    const MAY_DEVIATE: bool = false;
 
     fn function(&self) -> u8 {
         self.function

@@ -13,13 +13,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.extras = Some(Engine::extras);
     }
 
-    /// True if an extension is set, which calls these extras too.
-    pub fn has_extension(&self) -> bool {
-        self.extras.is_some()
-    }
-
     /// See [`super::Extension`].
-    pub(crate) fn extras(&mut self, moment: Moment) -> bool {
+    pub(super) fn extras(&mut self, moment: Moment) -> bool {
         match moment {
             Moment::Byte => self.take_echo(),
             Moment::Sent => self.hold_driver(),

@@ -351,7 +351,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Ends the request with the finding in `seen`.
     fn settle(&mut self) -> Status {
-        if self.run_extension(Moment::End) {
+        self.run_lenient(Moment::End);
+        if self.run_extras(Moment::End) {
             return Status::PENDING;
         }
         if self.seen.is_response() {
@@ -360,15 +361,16 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.seen.status()
     }
 
-    /// Runs the extension, if there is one. Returns true if it replaces the code that follows at this
-    /// moment.
+    /// Runs `extras`, if it is in use. Returns true if it replaces the code that follows.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn run_extension(&mut self, moment: Moment) -> bool {
-        let extension = match Q::MAY_DEVIATE {
-            true => self.lenient.or(self.extras),
-            false => self.extras,
-        };
-        extension.is_some_and(|extension| extension(self, moment))
+    pub(super) fn run_extras(&mut self, moment: Moment) -> bool {
+        self.extras.is_some_and(|extras| extras(self, moment))
+    }
+
+    /// As [`Engine::run_extras`], what accepts deviating replies.
+    #[inline(always)]
+    pub(super) fn run_lenient(&mut self, moment: Moment) -> bool {
+        self.lenient.is_some_and(|lenient| lenient(self, moment))
     }
 
     /// Cancels the request and switches the driver off. If the request was sent completely,
@@ -526,7 +528,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         if self.phase == Phase::Flush && !self.port.flush() {
             return self.stalled();
         }
-        if self.run_extension(Moment::Sent) {
+        if self.run_extras(Moment::Sent) {
             return Status::PENDING;
         }
         // The request has been sent: the driver goes off, and the wait for the reply begins.

@@ -76,7 +76,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.end += 1u8.into();
         let is_whole = self.continue_frame();
         let function = self.function;
-        if self.run_extension(Moment::Byte) {
+        if self.run_extras(Moment::Byte) {
             return false;
         }
         let is_response = if self.check_end(EXCEPTION_FRAME.into(), function | EXCEPTION) {
@@ -93,7 +93,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 return true;
             }
         }
-        let goes_on = self.run_extension(Moment::Missed);
+        let goes_on = self.run_lenient(Moment::Missed);
         is_whole && !goes_on && self.skip_frame()
     }
 

@@ -16,10 +16,6 @@ pub trait Transaction<P, S: Storage>: Sized {
     /// does.
     const IS_REPEATED: bool;
 
-    /// True if deviating replies may be accepted. Without this constant, clients take 18 bytes more
-    /// on an AVR.
-    const MAY_DEVIATE: bool;
-
     /// The function code.
     fn function(&self) -> u8;
 

@@ -265,7 +265,6 @@ impl<P, S: Words> Transaction<P, S> for MasterRequest {
     const NONE: Self = MasterRequest::NONE;
     const HAS_FIXED_REPLY: bool = true;
     const IS_REPEATED: bool = true;
-    const MAY_DEVIATE: bool = true;
 
     fn function(&self) -> u8 {
         MasterRequest::function(self)

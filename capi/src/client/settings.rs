@@ -43,10 +43,7 @@ unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings))
         let kind = &*(*object).kind;
         change(kind.settings(object));
         if kind.framing != MBM_FRAMING_TCP {
-            let engine = &mut transport::<SerialTransport>(object).engine;
-            if !engine.has_extension() {
-                engine.use_extras();
-            }
+            transport::<SerialTransport>(object).engine.use_extras();
         }
     })
 }
