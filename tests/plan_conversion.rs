@@ -348,7 +348,7 @@ proptest! {
                 prop_assert_eq!(refused, Error::OUT_OF_RANGE);
                 let is_wide = [product, added, denominator]
                     .iter()
-                    .any(|number| number.abs() >= 1 << 60);
+                    .any(|number| number.abs() >= 1 << 64);
                 prop_assert!(is_wide || i32::try_from(rounded).is_err());
             }
         }

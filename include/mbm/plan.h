@@ -344,7 +344,7 @@ uint8_t mbm_plan_getConverted(const mbm_plan *plan, uint16_t field, uint16_t ind
  * @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
  * @param decimals  0 to 9: 21.5 is 215 with 1 decimal
  * @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to it,
- *         is too large: number * multiplier * 10^(power + decimals) must be below 2^60
+ *         is too large: number * multiplier * 10^(power + decimals) must be below 2^64
  */
 uint8_t mbm_plan_getDecimal(const mbm_plan *plan, uint16_t field, uint16_t index,
                             const mbm_planConversion *conversion, uint8_t decimals, int32_t *value);

@@ -5,7 +5,7 @@
 
 use super::field::{Field, DOUBLE, FLOAT, INT32, TEXT};
 use super::value::{scale, Words};
-use super::wide::Wide;
+use super::wide::{times_small, Wide};
 use crate::error::Error;
 
 /// The greatest power of ten, and the least without its sign: those of SunSpec.
@@ -209,10 +209,11 @@ fn times(one: u32, mut other: u32) -> u64 {
 /// A number times 10^`power`.
 fn times_power(mut number: u64, power: i8) -> Result<u64, Error> {
     for _ in 0..power {
-        if number >> 60 != 0 {
+        let carry;
+        (number, carry) = times_small(number, 10);
+        if carry != 0 {
             return Err(Error::OUT_OF_RANGE);
         }
-        number = (number << 3) + (number << 1);
     }
     Ok(number)
 }

@@ -25,7 +25,7 @@ impl Wide {
             } else {
                 &mut multiplier
             };
-            *factor += *factor << 2;
+            (*factor, _) = times_small(*factor, 5);
         }
         let mut product = 0u128;
         for _ in 0..u64::BITS {
@@ -130,4 +130,17 @@ fn shifted(significand: u128, places: u32) -> u128 {
     }
     let kept = significand >> places;
     kept | u128::from(kept << places != significand)
+}
+
+/// A product, and what of it goes beyond 64 bits. (An AVR has no other use for a multiplication of
+/// 64 bits, which shifts and sums of this number would become.)
+pub(super) fn times_small(mut number: u64, factor: u16) -> (u64, u16) {
+    let (mut product, mut carry) = (0u64, 0u32);
+    for _ in 0..u64::BITS / u16::BITS {
+        carry += u32::from(number as u16) * u32::from(factor);
+        number >>= 16;
+        product = product >> 16 | u64::from(carry as u16) << 48;
+        carry >>= 16;
+    }
+    (product, carry as u16)
 }

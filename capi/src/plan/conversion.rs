@@ -232,7 +232,7 @@ pub unsafe extern "C" fn mbm_plan_getConverted(
 /// @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
 /// @param decimals  0 to 9: 21.5 is 215 with 1 decimal
 /// @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to it,
-///         is too large: number * multiplier * 10^(power + decimals) must be below 2^60
+///         is too large: number * multiplier * 10^(power + decimals) must be below 2^64
 #[no_mangle]
 pub unsafe extern "C" fn mbm_plan_getDecimal(
     plan: *const mbm_plan,
