@@ -82,7 +82,8 @@ static int make_storage(bridge_table *table, int register_gap)
     table->last = (published *)calloc(count, sizeof *table->last);
     for (field = 0; field < count; field++)
         table->units[table->fields.planned[field].unit].fields++;
-    if (!device_plan_make(&table->setup, &table->fields, register_gap, BRIDGE_REQUESTS))
+    if (!device_plan_make(&table->setup, &table->fields, register_gap, BRIDGE_REQUESTS) ||
+        !device_plan_split(&table->splitting, &table->setup))
         return 0;
     table->setup.bitGap = table->fields.limits.bit_gap;
     return table->last != NULL;
@@ -139,6 +140,7 @@ void bridge_table_free(bridge_table *table)
         free(table->last[field].value);
     free(table->last);
     device_plan_free(&table->setup);
+    free(table->splitting.blocks);
     device_free(&table->fields);
     free(table);
 }
@@ -258,6 +260,24 @@ static void update_scaled(bridge_line *l, uint16_t power)
             publish_value(l, field);
 }
 
+/* Logs that the device does not have a field, and that it has it again. */
+static void log_refused(bridge_line *l, uint16_t field, uint8_t status)
+{
+    published *was = &l->table->last[field];
+    const char *name = l->table->fields.fields[field].name;
+    const unsigned unit = l->table->fields.planned[field].unit;
+
+    if (device_plan_is_refused(status) && !was->is_refused) {
+        was->is_refused = 1;
+        report_log(REPORT_WARNING,
+                   "%s: unit %u refuses %s: %s. It is tried again after ten minutes", l->text, unit,
+                   name, mbm_status_text(status));
+    } else if (status == MBM_OK && was->is_refused) {
+        was->is_refused = 0;
+        report_log(REPORT_INFO, "%s: unit %u has %s again", l->text, unit, name);
+    }
+}
+
 /* Called by the plan for each field whose read has ended. */
 static void on_update(void *context, mbm_plan *ended, uint16_t field)
 {
@@ -265,6 +285,7 @@ static void on_update(void *context, mbm_plan *ended, uint16_t field)
     const int is_new = take_value(l, field) || l->bridge->is_every;
 
     update_unit(l, field, mbm_plan_getStatus(ended, field, NULL));
+    log_refused(l, field, mbm_plan_getStatus(ended, field, NULL));
     if (is_new)
         publish_value(l, field);
     if (l->table->fields.fields[field].is_power)
@@ -589,7 +610,7 @@ void bridge_line_end(bridge_line *l)
 
 void bridge_line_poll(bridge_line *l)
 {
-    (void)mbm_plan_poll(&l->plan);
+    (void)mbm_plan_pollSplitting(&l->plan, &l->table->splitting);
     line_poll(&l->at);
 }
 

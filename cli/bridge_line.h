@@ -23,6 +23,7 @@ typedef struct published {
     uint8_t status;
     uint8_t is_answered; /* the unit answered the last read */
     uint8_t has_ended;   /* the first read has ended */
+    uint8_t is_refused;  /* the device does not have it, and that was logged */
 } published;
 
 /* A unit: how many of its fields have which state. */
@@ -39,6 +40,7 @@ typedef struct bridge_table {
     published *last; /* of the fields that can be read */
     unit_state units[256];
     mbm_planSetup setup; /* complete, but for `update` and `context` */
+    mbm_planSplitting splitting;
 } bridge_table;
 
 /* Reads a device file for the bridge, and checks that a plan can read it. `register_gap` -1 is that

@@ -35,6 +35,18 @@ int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t re
     return setup->positions && setup->reads && setup->data && setup->requests;
 }
 
+int device_plan_split(mbm_planSplitting *splitting, const mbm_planSetup *setup)
+{
+    memset(splitting, 0, sizeof *splitting);
+    splitting->blocks = (uint16_t *)calloc(setup->fieldCount, sizeof *splitting->blocks);
+    return splitting->blocks != NULL;
+}
+
+int device_plan_is_refused(uint8_t status)
+{
+    return status == MBM_ILLEGAL_DATA_ADDRESS || status == MBM_ILLEGAL_DATA_VALUE;
+}
+
 void device_plan_free(mbm_planSetup *setup)
 {
     free(setup->positions);

@@ -14,6 +14,13 @@ enum { DEVICE_PLAN_OWN_GAP = -1 };
 int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t requests);
 void device_plan_free(mbm_planSetup *setup);
 
+/* Gives `splitting` the storage for a plan with this setup, which is free()d as its `blocks`.
+ * Returns 0 without memory. */
+int device_plan_split(mbm_planSplitting *splitting, const mbm_planSetup *setup);
+
+/* Whether the device does not have a field, or refuses it, by the status of the field. */
+int device_plan_is_refused(uint8_t status);
+
 /* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns
  * the status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may
  * begin then. */

@@ -153,7 +153,8 @@ static int begin_plan(polling *p)
 
     if (p->read.meter.readable == 0)
         return report(CODE_WRONG, "%s has no field that can be read", p->file);
-    if (!device_plan_make(&p->read.setup, &p->read.meter, p->gap, requests))
+    if (!device_plan_make(&p->read.setup, &p->read.meter, p->gap, requests) ||
+        !device_plan_split(&p->read.splitting, &p->read.setup))
         return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     p->read.setup.update = take_field;
     p->read.setup.context = p;
@@ -279,6 +280,27 @@ static void report_first_failure(polling *p)
     (void)report_failure(who, status, exception, options.timeoutMs, why, advice);
 }
 
+/* Names the fields that the device refuses, if the failure of the first does not name them all. */
+static void report_refused(polling *p)
+{
+    enum { NAMED = 20 };
+    char names[NAMED * (DEVICE_NAME_BYTES + 2)] = "";
+    unsigned refused = 0;
+    size_t length = 0;
+    uint16_t i;
+
+    for (i = 0; i < p->read.meter.readable; i++)
+        if (device_plan_is_refused(mbm_plan_getStatus(&p->read.plan, i, NULL)) &&
+            ++refused <= NAMED)
+            length += (size_t)snprintf(names + length, sizeof names - length, "%s%s",
+                                       refused > 1 ? ", " : "", p->read.meter.fields[i].name);
+    if (refused > 1)
+        fprintf(stderr,
+                "%s: the device refuses %u of %u fields: %s%s. The others are read without them.\n",
+                report_name, refused, p->read.meter.readable, names,
+                refused > NAMED ? " and others" : "");
+}
+
 /* Says how it went, and what to look at after the first failure. */
 static void show_end(polling *p, uint32_t round)
 {
@@ -286,6 +308,7 @@ static void show_end(polling *p, uint32_t round)
 
     if (p->first_failure.status != MBM_OK)
         report_first_failure(p);
+    report_refused(p);
     if (!options.is_quiet)
         fprintf(stderr, "%s: rounds: %u, requests: %u, replies: %u, exceptions: %u.\n", report_name,
                 (unsigned)round, (unsigned)counters->requests, (unsigned)counters->replies,
@@ -341,7 +364,7 @@ static void poll_rounds(polling *p)
 
         if (p->forMs && now - start >= p->forMs)
             break;
-        (void)mbm_plan_poll(&p->read.plan);
+        (void)mbm_plan_pollSplitting(&p->read.plan, &p->read.splitting);
         line_poll(&p->read.at);
         if (round == 0 ? is_every_field_read(p) : (int32_t)(now - due) >= 0) {
             show_round(p, ++round);
@@ -385,6 +408,7 @@ int poll_command(int argc, char **argv)
             poll_rounds(p);
         (void)mbm_plan_end(&p->read.plan);
         device_plan_free(&p->read.setup);
+        free(p->read.splitting.blocks);
         line_close(&p->read.at);
     }
     device_free(&p->read.meter);

@@ -13,6 +13,7 @@ typedef struct polled {
     device meter;
     mbm_plan plan;
     mbm_planSetup setup;
+    mbm_planSplitting splitting;
 } polled;
 
 /* The code of an exception, or 0 for another status. */

@@ -4,6 +4,7 @@
 #include "numbers.h"
 #include "options.h"
 #include "report.h"
+#include "sunspec.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -24,12 +25,13 @@ typedef struct scanning {
     mbm_clientRequest requests[OPTIONS_UNITS];
     uint16_t values[OPTIONS_UNITS];
     unsigned answering, damaged, tried;
+    int is_sunspec;
     char came[160]; /* in place of the first reply that did not come, if anything did */
 } scanning;
 
 /* --- the command line --- */
 
-enum { UNITS_KEY = 1, RATES_KEY, PARITIES_KEY };
+enum { UNITS_KEY = 1, RATES_KEY, PARITIES_KEY, SUNSPEC };
 
 static void read_rate(const struct argp_state *state, char *item)
 {
@@ -69,13 +71,17 @@ static void check_arguments(scanning *s, const struct argp_state *state)
         options_wrong(state, "LINE is missing");
     if (!place_is_serial(&s->where) && s->rate_count + s->parity_count > 0)
         options_wrong(state, "--rates and --parities need a serial line");
+    if (s->is_sunspec && s->rate_count + s->parity_count > 0)
+        options_wrong(state,
+                      "--sunspec reads at the rate and parity of LINE: leave out --rates and "
+                      "--parities");
     if (s->unit_count == 0)
-        s->unit_count = options_units(state, "--units", "1-247", s->units);
+        s->unit_count = options_units(state, "--units", s->is_sunspec ? "1" : "1-247", s->units);
     if (s->rate_count == 0)
         s->rates[s->rate_count++] = s->where.tty.baud;
     if (s->parity_count == 0)
         s->parities[s->parity_count++] = s->where.tty.parity;
-    if (!options.has_timeout && place_is_serial(&s->where))
+    if (!options.has_timeout && place_is_serial(&s->where) && !s->is_sunspec)
         options.timeoutMs = 200;
     /* A scan expects that units are silent. */
     if (!options.has_replace_after)
@@ -89,6 +95,7 @@ static error_t parse(int key, char *text, struct argp_state *state)
     switch (key) {
     case UNITS_KEY: s->unit_count = options_units(state, "--units", text, s->units); return 0;
     case RATES_KEY: read_list(state, text, read_rate); return 0;
+    case SUNSPEC: s->is_sunspec = 1; return 0;
     case PARITIES_KEY: read_list(state, text, read_parity); return 0;
     case ARGP_KEY_ARG:
         if (state->arg_num > 0)
@@ -104,6 +111,7 @@ static const struct argp_option texts[] = {
     {"units", UNITS_KEY, "LIST", 0, "The units to try, such as 1-20,100 (1-247)", 1},
     {"rates", RATES_KEY, "LIST", 0, "Baud rates to try, such as 9600,19200 (that of LINE)", 1},
     {"parities", PARITIES_KEY, "LIST", 0, "Parities to try, of none,even,odd (that of LINE)", 1},
+    {"sunspec", SUNSPEC, NULL, 0, "List the SunSpec models of the units (--units 1)", 1},
     {0}};
 
 static const struct argp_child children[] = {{.argp = &options_client}, {0}};
@@ -202,6 +210,20 @@ static int scan(scanning *s)
     return CODE_DONE;
 }
 
+/* Lists the SunSpec models of each unit. Returns an exit code. */
+static int scan_models(scanning *s)
+{
+    int code = line_open(&s->at, &s->where);
+    unsigned i;
+
+    if (code == CODE_DONE)
+        code = line_connect(&s->at);
+    for (i = 0; i < s->unit_count && code == CODE_DONE && !report_stopped; i++)
+        (void)sunspec_scan(&s->at, s->units[i]);
+    line_close(&s->at);
+    return report_code;
+}
+
 /* Scans with one rate and parity. Returns an exit code. */
 static int scan_line(scanning *s, uint32_t rate, char parity)
 {
@@ -229,6 +251,8 @@ int scan_command(int argc, char **argv)
     unsigned i;
 
     argp_parse(&arguments, argc, argv, 0, NULL, s);
+    if (s->is_sunspec)
+        return scan_models(s);
     for (i = 0; i < s->rate_count * s->parity_count && code == CODE_DONE && !report_stopped; i++)
         code = scan_line(s, s->rates[i / s->parity_count], s->parities[i % s->parity_count]);
     if (code == CODE_DONE && !options.is_quiet)

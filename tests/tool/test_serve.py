@@ -284,10 +284,9 @@ def test_poll_prints_the_values_of_a_device(mbm):
     begin = time.monotonic()
     code, out, error = mbm(*poll, "--for", "1s")
     assert code == DONE and time.monotonic() - begin >= 1 and out.count("round ") >= 1
-    # A gap that the device does not have.
+    # A gap that the device does not have: the requests become shorter.
     code, out, error = mbm(*poll, "--once", "--gap", "16")
-    assert code == EXCEPTION and "exception 02: illegal data address" in out
-    assert re.search(r"mbm poll: unit 17, field [\w ]+ in line \d+ of the file: exception 02", error), error
+    assert code == DONE and "exception" not in out and "exceptions: 0" not in error, error
 
 
 def test_ctrl_c_ends_poll(mbm):
