@@ -75,8 +75,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         delimiter: 0,
         function: 0,
     };
-    const HAS_FIXED_REPLY: bool = false;
-    const IS_REPEATED: bool = false;
+    const IS_OF_MASTER: bool = false;
 
     fn function(&self) -> u8 {
         self.function

@@ -60,7 +60,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     fn repeat_if_allowed(&mut self) -> bool {
         let retries = self.settings.retries;
         let is_final = self.seen.is_response() || self.seen == Finding::TOO_LONG;
-        if !Q::IS_REPEATED || self.retries >= retries || is_final {
+        if !Q::IS_OF_MASTER || self.retries >= retries || is_final {
             return false;
         }
         self.retries += 1;

@@ -329,7 +329,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// True if bytes have arrived that may be a reply of unknown length, which silence ends.
     fn may_end_in_silence(&self) -> bool {
-        !Q::HAS_FIXED_REPLY && self.awaits_end
+        !Q::IS_OF_MASTER && self.awaits_end
     }
 
     /// Searches the received bytes for a reply that ends with the silence. False if the request
@@ -439,7 +439,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.unit = unit;
         self.function = self.request.function();
         self.length = self.request.reply_length();
-        if Q::IS_REPEATED {
+        if Q::IS_OF_MASTER {
             self.retries = 0;
         }
         self.begin()

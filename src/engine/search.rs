@@ -24,7 +24,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Searches the `received` bytes that the port has written to the frame buffer from `first`
     /// on. True if the request ends. The bytes after the reply are dropped then.
     pub(crate) fn search(&mut self, first: S::Count, received: S::Count) -> bool {
-        if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
+        if !Q::IS_OF_MASTER && self.length == S::Count::ZERO {
             self.awaits_end = true;
         }
         if P::READS_SINGLE_BYTES {
@@ -118,7 +118,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     /// Finds the reply's frame that ends with the last byte, with a right CRC. Returns its length, or
     /// 0 if there is none.
     fn find_ending_reply(&mut self) -> S::Count {
-        if !Q::HAS_FIXED_REPLY && self.length == S::Count::ZERO {
+        if !Q::IS_OF_MASTER && self.length == S::Count::ZERO {
             return Q::find_ending_reply(self, false);
         }
         match self.check_end(self.length, self.function) {
@@ -290,7 +290,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     pub(crate) fn see_nothing(&mut self) {
         self.is_early = false;
         self.exception = 0;
-        self.seen = if Q::HAS_FIXED_REPLY && self.length > self.storage.capacity() {
+        self.seen = if Q::IS_OF_MASTER && self.length > self.storage.capacity() {
             Finding::TOO_LONG
         } else {
             Finding::NOTHING
@@ -326,7 +326,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         } else {
             keep -= 1u8.into();
         }
-        if Q::HAS_FIXED_REPLY {
+        if Q::IS_OF_MASTER {
             // An exception is shorter than any reply.
             keep = keep.min(self.length.max(self.outgoing) - 1u8.into());
         }

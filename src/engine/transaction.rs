@@ -9,12 +9,9 @@ pub trait Transaction<P, S: Storage>: Sized {
     /// No request.
     const NONE: Self;
 
-    /// True if every request determines the length of its reply.
-    const HAS_FIXED_REPLY: bool;
-
-    /// True if the engine repeats a request as its settings say; false if the queue of a client
-    /// does.
-    const IS_REPEATED: bool;
+    /// True for a request of a master: it always determines the length of its reply, and the engine
+    /// repeats it as its settings say. False for one of a client, whose queue repeats it.
+    const IS_OF_MASTER: bool;
 
     /// The function code.
     fn function(&self) -> u8;

@@ -263,8 +263,7 @@ const AROUND_PDU: u8 = rtu::OVERHEAD as u8;
 
 impl<P, S: Words> Transaction<P, S> for MasterRequest {
     const NONE: Self = MasterRequest::NONE;
-    const HAS_FIXED_REPLY: bool = true;
-    const IS_REPEATED: bool = true;
+    const IS_OF_MASTER: bool = true;
 
     fn function(&self) -> u8 {
         MasterRequest::function(self)
