@@ -274,11 +274,11 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value numbers)
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
-	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value numbers report)
+	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))

@@ -123,9 +123,9 @@ TEST(bits_of_a_register_are_written_if_the_device_writes_masks)
               "     order: BADC, access: read-write}\n");
     assert_int_equal(meter.writes_masks, 1);
     /* The field that can be read comes first. Its order swaps the bytes of the register. */
-    assert_int_equal(device_mask(&meter.planned[0]), 0x7000);
+    assert_int_equal(device_mask(&meter.planned[0], 0), 0x7000);
     assert_int_equal(device_part(&meter.planned[0], 5), 0x5000);
-    assert_int_equal(device_mask(&meter.planned[1]), 0x0008);
+    assert_int_equal(device_mask(&meter.planned[1], 0), 0x0008);
     assert_int_equal(device_part(&meter.planned[1], 1), 0x0008);
     device_free(&meter);
     read_text("mask_write: no\n" UINT16(""));
@@ -165,11 +165,21 @@ TEST(a_wrong_word_is_refused_with_its_line)
         const char *text, *reason;
     } rows[] = {
         {FIELD("    type: real\n"), "5: type: \"real\" is not one of bit, uint16, int16, uint32, "
-                                    "int32, uint64, int64, float, double and text"},
+                                    "int32, uint64, int64, float, double, text, int24, "
+                                    "uint24, int48, uint48, sign_magnitude16, sign_magnitude32, "
+                                    "bcd16, bcd32, int32_m10k, uint32_m10k, int48_m10k, "
+                                    "uint48_m10k, int64_m10k, uint64_m10k, float16, text_spaces, "
+                                    "text_low, text_low_spaces, text_high, text_high_spaces, "
+                                    "unix32, unix64, unix64_ms, seconds_2000, iec870, iec870_3, "
+                                    "date and date_bcd"},
         {"fields:\n- name: a\n  table: holdings\n  address: 0\n  type: uint16\n",
          "3: table: \"holdings\" is not one of coils, discrete, holding and input"},
-        {UINT16("    order: abcd\n"), "6: order: \"abcd\" is not one of ABCD, CDAB, BADC and DCBA"},
-        {"order: 1234\n" UINT16(""), "1: order: \"1234\" is not one of ABCD, CDAB, BADC and DCBA"},
+        {UINT16("    order: abcd\n"),
+         "6: order: \"abcd\" is not one of ABCD, CDAB, BADC, DCBA, EFGHABCD, "
+         "CDABGHEF, FEHGBADC and DCBAHGFE"},
+        {"order: 1234\n" UINT16(""),
+         "1: order: \"1234\" is not one of ABCD, CDAB, BADC, DCBA, EFGHABCD, "
+         "CDABGHEF, FEHGBADC and DCBAHGFE"},
         {UINT16("    access: rw\n"), "6: access: \"rw\" is not one of read, write and read-write"},
         {"fields: [{name: a, table: coils, address: 0, value: yes}]",
          "1: value: \"yes\" is not one of 0, 1, false, true, off and on"},

@@ -519,7 +519,7 @@ TEST(a_layout_that_is_none_is_refused)
 
 TEST(a_date_of_iec_870_5_4_has_three_or_four_registers)
 {
-    /* 2026-11-27 23:59:58.123, Friday, in summer time, not synchronized. */
+    /* 2026-11-27 23:59:58.123, Friday, in summer time, not synchronised. */
     static const uint16_t plain[] = {26, 0x0B1B, 0x173B, 58123};
     const mbm_date friday = {2026, 123, 11, 27, 23, 59, 58, 0};
     mbm_date back = MBM_INIT, other = friday;

@@ -215,7 +215,7 @@ static void publish_value(bridge_line *l, uint16_t field)
 
     if (l->bridge->is_plain) {
         /* Plain text has no place for a status: what failed is not published. */
-        if (what->value && (what->status == MBM_OK || what->status == MBM_NOT_AVAILABLE))
+        if (what->value && device_plan_is_read(what->status))
             publish(l, name, NULL, value, 1);
         return;
     }
@@ -238,7 +238,7 @@ static int take_value(bridge_line *l, uint16_t field)
     int is_new = status != was->status || !was->has_ended;
 
     /* "None" is unknown to Home Assistant. */
-    if ((status == MBM_OK || status == MBM_NOT_AVAILABLE) &&
+    if (device_plan_is_read(status) &&
         device_plan_text(&l->plan, of, field, !l->bridge->is_plain, "None", text) &&
         (!was->value || strcmp(text, was->value) != 0)) {
         free(was->value);
@@ -413,7 +413,7 @@ static uint8_t write_part(bridge_line *l, bridge_write *write, const value_form 
         return MBM_INVALID_ARGUMENT;
     }
     return mbm_client_maskWriteRegister(&l->at.client, &write->request, planned->address,
-                                        (uint16_t)~device_mask(planned),
+                                        (uint16_t)~device_mask(planned, 0),
                                         device_part(planned, bits[0]));
 }
 
@@ -580,7 +580,8 @@ unsigned bridge_line_not_available(const bridge_line *l)
     uint16_t field;
 
     for (field = 0; field < l->table->fields.readable; field++)
-        count += l->table->last[field].status == MBM_NOT_AVAILABLE;
+        count += l->table->last[field].status == MBM_NOT_AVAILABLE ||
+                 l->table->last[field].status == MBM_MALFORMED_VALUE;
     return count;
 }
 

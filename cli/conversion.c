@@ -32,9 +32,10 @@ value_scale conversion_power(int power)
 
 const char *conversion_add(conversion *to, const value_form *form, const char *text)
 {
-    value_form plain = {.type = form->type, .order = form->order};
+    value_form plain = *form;
     const char *wrong;
 
+    memset(&plain.scale, 0, sizeof plain.scale);
     plain.is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
     memset(to->numbers[to->number_count], 0, sizeof to->numbers[0]);
     if (value_read(&plain, text, strlen(text), to->numbers[to->number_count], &wrong) == 0)
@@ -68,11 +69,11 @@ static int is_reserved(const value_form *form, const uint16_t words[VALUE_WORDS]
 }
 
 /* Whether all registers of a text are 0. */
-static int is_empty(const mbm_registers *registers, uint16_t address, uint16_t count)
+static int is_empty(uint8_t type, const mbm_registers *registers, uint16_t address, uint16_t count)
 {
     uint16_t i, word = 0;
 
-    for (i = 0; i < value_registers(MBM_TYPE_TEXT, count); i++) {
+    for (i = 0; i < value_registers(type, count); i++) {
         (void)mbm_registers_getUint16(registers, (uint16_t)(address + i), MBM_ORDER_ABCD, &word);
         if (word != 0)
             return 0;
@@ -87,14 +88,16 @@ static int is_listed(const value_form *form, const mbm_registers *registers, uin
     const conversion *of = conversion_of(form);
     uint16_t words[VALUE_WORDS] = {0}, size, i;
 
-    if (form->type == MBM_TYPE_TEXT)
-        return of->is_standard && is_empty(registers, address, count);
+    if (value_is_text(form->type))
+        return of->is_standard && is_empty(form->type, registers, address, count);
     if (!of->is_standard && of->number_count == 0)
         return 0;
     size = value_registers(form->type, 1);
-    for (i = 0; i < size && i < VALUE_WORDS; i++)
+    for (i = 0; i < size && i < VALUE_WORDS; i++) {
         (void)mbm_registers_getUint16(registers, (uint16_t)(address + i), MBM_ORDER_ABCD,
                                       &words[i]);
+        words[i] &= value_mask(form->type, form->order, form->first, form->bits, i);
+    }
     for (i = 0; i < of->number_count; i++)
         if (memcmp(words, of->numbers[i], size * sizeof *words) == 0)
             return 1;
@@ -130,7 +133,8 @@ uint8_t conversion_print(const value_form *form, const mbm_registers *registers,
 {
     static decimal_number number;
     const conversion *of = conversion_of(form);
-    const int is_number = form->type != MBM_TYPE_TEXT && form->type != MBM_TYPE_BIT;
+    const int is_number =
+        !value_is_text(form->type) && !value_is_date(form->type) && form->type != MBM_TYPE_BIT;
     int is_nan = 0, is_finite = is_number && get_number(form, registers, address, &number, &is_nan);
 
     if (is_nan || is_listed(form, registers, address, count)) {
@@ -139,8 +143,7 @@ uint8_t conversion_print(const value_form *form, const mbm_registers *registers,
     }
     if (form->is_hex || !is_finite || (of->offset.digits == 0 && !of->has_precision) ||
         !convert(form, &number)) {
-        value_print(form, registers, address, count, is_json, text);
-        return MBM_OK;
+        return value_print(form, registers, address, count, is_json, text);
     }
     if (of->has_precision)
         decimal_round(&number, of->precision);

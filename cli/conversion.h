@@ -29,8 +29,8 @@ const char *conversion_add(conversion *to, const value_form *form, const char *t
 value_scale conversion_power(int power);
 
 /* As value_print, with the conversion of the form. Returns MBM_OK; MBM_NOT_AVAILABLE with "null" in
- * JSON, and else an empty text, if the registers have no value. A float that is not a number never
- * is one. */
+ * JSON, and else an empty text, if the registers have no value; MBM_MALFORMED_VALUE in the same way
+ * if they hold none of the type. A float that is not a number never is one. */
 uint8_t conversion_print(const value_form *form, const mbm_registers *registers, uint16_t address,
                          uint16_t count, int is_json, char text[VALUE_TEXT_BYTES]);
 

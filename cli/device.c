@@ -15,12 +15,37 @@ int device_is_part(const mbm_planField *planned)
     return planned->type == MBM_TYPE_BIT && planned->table >= MBM_TABLE_HOLDING_REGISTERS;
 }
 
+int device_is_wide_part(const mbm_planField *planned)
+{
+    return value_is_wide_bits(planned->type);
+}
+
+uint16_t device_values_in(const mbm_planField *planned)
+{
+    const int is_one = value_is_text(planned->type) || device_is_part(planned) ||
+                       device_is_wide_part(planned) || planned->count == 0;
+
+    return is_one ? 1 : planned->count;
+}
+
 uint32_t device_size(const mbm_planField *planned)
 {
     const uint16_t count = planned->count ? planned->count : 1;
-    const uint16_t one = value_registers(planned->type, count);
 
-    return planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? one : (uint32_t)one * count;
+    return (uint32_t)value_registers(planned->type, count) * device_values_in(planned);
+}
+
+mbm_planField device_read_as(const mbm_planField *planned)
+{
+    mbm_planField field = *planned;
+
+    if (value_is_of_plan(planned->type, planned->order))
+        return field;
+    field.type = MBM_TYPE_REGISTERS;
+    field.count = (uint16_t)device_size(planned);
+    field.order = MBM_ORDER_ABCD;
+    field.bit = 0;
+    return field;
 }
 
 uint16_t device_part(const mbm_planField *planned, uint16_t bits)
@@ -33,10 +58,11 @@ uint16_t device_part(const mbm_planField *planned, uint16_t bits)
     return word;
 }
 
-uint16_t device_mask(const mbm_planField *planned)
+uint16_t device_mask(const mbm_planField *planned, uint32_t nth)
 {
-    return device_is_part(planned) ? device_part(planned, (uint16_t)((1u << planned->count) - 1))
-                                   : 0xFFFF;
+    if (device_is_part(planned))
+        return device_part(planned, (uint16_t)((1u << planned->count) - 1));
+    return value_mask(planned->type, planned->order, planned->bit, (uint8_t)planned->count, nth);
 }
 
 const char *device_label_of(const device *from, uint16_t field, const uint16_t *words)
@@ -66,6 +92,7 @@ void device_free(device *into)
         free(field->identifier);
         free(field->unit_of_measurement);
         free(field->description);
+        free(field->layout);
         free(field->words);
         free(field->press);
         free(field->power_name);

@@ -43,6 +43,7 @@ typedef struct device_field {
     char *topic, *identifier;  /* what the name becomes elsewhere: see names.h */
     char *unit_of_measurement; /* NULL if the file gives none */
     char *description;         /* NULL if the file gives none */
+    char *layout;              /* of a date; NULL without one. `form` has it too */
     value_form form;
     uint8_t access;         /* DEVICE_READ, DEVICE_WRITE or both */
     uint8_t write_function; /* DEVICE_BY_SIZE, DEVICE_SINGLE or DEVICE_MULTIPLE */
@@ -88,10 +89,18 @@ const char *device_label_of(const device *from, uint16_t field, const uint16_t *
 /* Returns how many registers or bits a field has. */
 uint32_t device_size(const mbm_planField *planned);
 
-/* Returns whether a field is bits of one register; and which bits of its words a field has: only
- * such a field has not all. */
+/* Returns how many values a field has: several numbers in a row or bits of a table; otherwise 1. */
+uint16_t device_values_in(const mbm_planField *planned);
+
+/* Returns whether a field is bits of one register, or of several; and which bits of its nth
+ * register a field has: only such a field has not all. */
 int device_is_part(const mbm_planField *planned);
-uint16_t device_mask(const mbm_planField *planned);
+int device_is_wide_part(const mbm_planField *planned);
+uint16_t device_mask(const mbm_planField *planned, uint32_t nth);
+
+/* Returns the field of the plan that reads a field of a device: registers as they are, if the plan
+ * does not know its type or order. */
+mbm_planField device_read_as(const mbm_planField *planned);
 
 /* Returns the word of a register that has this number in the bits of a field. */
 uint16_t device_part(const mbm_planField *planned, uint16_t bits);

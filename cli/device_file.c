@@ -6,9 +6,12 @@
 
 #include "device_address.h"
 #include "device_home.h"
+#include "device_initial.h"
+#include "device_labels.h"
 #include "device_limits.h"
 #include "device_names.h"
 #include "device_repeat.h"
+#include "device_types.h"
 #include "device_values.h"
 #include "report.h"
 
@@ -16,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_DESCRIPTION = 10000, MOST_LABELS = 1000 };
+enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_DESCRIPTION = 10000 };
 
 /* The keys of the file and of a field. The numbers count from 0 here. */
 enum {
@@ -29,14 +32,15 @@ enum {
     NOTATION,
     ONE_BASED,
     DEVICE_WRITE_FUNCTION,
+    DEVICE_TIME_ZONE,
     LIMITS,
     DEVICE_NOT_AVAILABLE = LIMITS + LIMITS_KEYS,
     DEVICE_KEYS
 };
 static const char *const DEVICE_NAMES[] = {
-    "device",        "unit",     "interval",  "order",          "mask_write",
-    "fields",        "notation", "one_based", "write_function", DEVICE_LIMITS_NAMES,
-    "not_available", NULL};
+    "device",   "unit",      "interval",       "order",     "mask_write",        "fields",
+    "notation", "one_based", "write_function", "time_zone", DEVICE_LIMITS_NAMES, "not_available",
+    NULL};
 enum {
     NAME,
     TABLE,
@@ -64,16 +68,26 @@ enum {
     MIN_VALUE,
     MAX_VALUE,
     STEP,
+    BITS_OF,
+    LAYOUT,
+    TIME_ZONE,
     FIELD_KEYS
 };
-static const char *const FIELD_NAMES[] = {
-    "name",          "table",        "address",     "type",
-    "bit",           "count",        "scale",       "unit_of_measurement",
-    "access",        "interval",     "value",       "unit",
-    "order",         "description",  "enumeration", "write_function",
-    "repeat",        "device_class", "state_class", "press",
-    "not_available", "offset",       "precision",   "min_value",
-    "max_value",     "step",         NULL};
+static const char *const FIELD_NAMES[] = {"name",          "table",
+                                          "address",       "type",
+                                          "bit",           "count",
+                                          "scale",         "unit_of_measurement",
+                                          "access",        "interval",
+                                          "value",         "unit",
+                                          "order",         "description",
+                                          "enumeration",   "write_function",
+                                          "repeat",        "device_class",
+                                          "state_class",   "press",
+                                          "not_available", "offset",
+                                          "precision",     "min_value",
+                                          "max_value",     "step",
+                                          "bits",          "layout",
+                                          "time_zone",     NULL};
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
@@ -116,10 +130,25 @@ static int read_address(yaml_file *file, const yaml_node_t *field, const yaml_no
     return 1;
 }
 
+/* The keys that complete a type. */
+static device_type_keys keys_of_type(const yaml_node_t *const *values)
+{
+    const device_type_keys keys = {.type = values[TYPE],
+                                   .order = values[ORDER],
+                                   .bit = values[BIT],
+                                   .bits = values[BITS_OF],
+                                   .count = values[COUNT],
+                                   .layout = values[LAYOUT],
+                                   .time_zone = values[TIME_ZONE]};
+
+    return keys;
+}
+
 /* Whether the type is known and goes with the table. Returns 0 after a refusal. */
 static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_t *const *values,
-                     mbm_planField *planned)
+                     mbm_planField *planned, device_field *into)
 {
+    const device_type_keys keys = keys_of_type(values);
     const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
 
     if (!values[TYPE] && !is_bits)
@@ -130,12 +159,12 @@ static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_
     if (is_bits && planned->type != MBM_TYPE_BIT)
         return yaml_file_refuse(file, values[TYPE],
                                 "type is %s: the type of coils and discrete inputs is bit",
-                                value_type_names[planned->type]);
+                                value_type_name(planned->type));
     if (values[BIT] && !device_is_part(planned))
         return yaml_file_refuse(file, values[BIT],
                                 "bit is for fields of the type bit in the tables holding and "
                                 "input");
-    return 1;
+    return device_types_read_layout(file, field, &keys, planned, into);
 }
 
 /* Reads bit and count, which must not reach beyond a request or the table. */
@@ -145,7 +174,7 @@ static int read_size(yaml_file *file, const yaml_node_t *field, const yaml_node_
     uint32_t bit = 0, count = 1, size;
     const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
 
-    if (planned->type == MBM_TYPE_TEXT && !values[COUNT])
+    if (value_is_text(planned->type) && !values[COUNT])
         return yaml_file_refuse(file, field, "a text needs its number of characters as count");
     if (!yaml_file_number(file, "bit", values[BIT], 0, 15, &bit) ||
         !yaml_file_number(file, "count", values[COUNT], 1, MOST_BITS, &count))
@@ -199,6 +228,10 @@ static int read_access(yaml_file *file, const yaml_node_t *node, const mbm_planF
         return yaml_file_refuse(file, node,
                                 "access is %s: only coils and holding registers can be written",
                                 ACCESS_NAMES[field->access]);
+    if (field->access > DEVICE_READ && device_is_wide_part(planned))
+        return yaml_file_refuse(file, node,
+                                "access is %s: bits of several registers cannot be written at once",
+                                ACCESS_NAMES[field->access]);
     if (field->access > DEVICE_READ && device_is_part(planned) && !writes_masks)
         return yaml_file_refuse(file, node,
                                 "access is %s: bits of a register cannot be written, unless the "
@@ -223,225 +256,25 @@ static int read_meaning(yaml_file *file, const yaml_node_t *const *values,
     return device_values_read(file, &keys, shared, planned, field);
 }
 
-/* The words for a bit: that at an odd place is 1. */
-static const char *const BITS[] = {"0", "1", "false", "true", "off", "on", NULL};
-
-/* --- a value --- */
-
-/* Writes a text of UTF-8 as Latin-1, as far as it fits. Returns its length, or -1 if a character is
- * not in Latin-1. The parser has checked that it is UTF-8. */
-static long to_latin(const char *text, char *latin, size_t capacity)
-{
-    size_t length = 0;
-
-    for (; *text; text++) {
-        unsigned char one = (unsigned char)*text;
-
-        if (one > 0xC3)
-            return -1;
-        if (one >= 0xC2)
-            one = (unsigned char)(one << 6 | (*++text & 0x3F));
-        if (length < capacity)
-            latin[length] = (char)one;
-        length++;
-    }
-    return (long)length;
-}
-
-static int read_text(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                     uint16_t *words)
-{
-    const char *text = yaml_file_text(file, "value", node, 2 * VALUE_LONGEST_TEXT);
-    char latin[VALUE_LONGEST_TEXT + 1] = "";
-    mbm_registers registers;
-    long length;
-
-    if (!text)
-        return 0;
-    length = to_latin(text, latin, sizeof latin - 1);
-    if (length < 0)
-        return yaml_file_refuse(file, node, "value has a character that is not in Latin-1");
-    if (length > planned->count)
-        return yaml_file_refuse(file, node, "value has %ld characters, and count is %u", length,
-                                planned->count);
-    (void)mbm_registers_intoWords(&registers, words, (uint16_t)device_size(planned), 0);
-    (void)mbm_registers_setString(&registers, 0, planned->count, planned->order, latin);
-    return 1;
-}
-
-/* Reads one bit as a word, or several as the number that they are. Returns 0 after a refusal. */
-static int read_bits(yaml_file *file, const yaml_node_t *node, uint16_t count, uint16_t *bits)
-{
-    uint32_t number = 0;
-    int index = 0;
-
-    if (count == 1 ? !yaml_file_word(file, "value", node, BITS, &index)
-                   : !yaml_file_number(file, "value", node, 0, (1u << count) - 1, &number))
-        return 0;
-    *bits = (uint16_t)(count == 1 ? index & 1 : number);
-    return 1;
-}
-
-/* Reads one number, or bits. Returns how many words it has, 0 after a refusal. */
-static uint16_t read_one(yaml_file *file, const yaml_node_t *node, const value_form *form,
-                         const mbm_planField *planned, uint16_t *words)
-{
-    uint16_t number[VALUE_WORDS], count;
-    const char *text, *wrong;
-
-    if (device_is_part(planned)) {
-        if (!read_bits(file, node, planned->count, number))
-            return 0;
-        *words = device_part(planned, *number);
-        return 1;
-    }
-    if (planned->type == MBM_TYPE_BIT)
-        return (uint16_t)read_bits(file, node, 1, words);
-    text = yaml_file_text(file, "value", node, VALUE_LONGEST);
-    if (!text)
-        return 0;
-    count = conversion_read(form, text, strlen(text), number, &wrong);
-    if (count == 0)
-        (void)yaml_file_refuse(file, node, "value: \"%s\" %s%s%s", text, wrong,
-                               strstr(wrong, "range") ? " of " : "",
-                               strstr(wrong, "range") ? value_type_names[planned->type] : "");
-    memcpy(words, number, count * sizeof *words);
-    return count;
-}
-
-static int read_value(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                      device_field *field)
-{
-    uint16_t *words, i;
-
-    if (!node)
-        return 1;
-    words = (uint16_t *)calloc(device_size(planned), sizeof *words);
-    if (!words)
-        return yaml_file_fail(file, ENOMEM);
-    field->words = words;
-    if (planned->type == MBM_TYPE_TEXT)
-        return read_text(file, node, planned, words);
-    if (planned->count == 1 || device_is_part(planned))
-        return read_one(file, node, &field->form, planned, words) > 0;
-    if (node->type != YAML_SEQUENCE_NODE || yaml_file_size(node) != planned->count)
-        return yaml_file_refuse(file, node, "value must be a list of %u values, as count says",
-                                planned->count);
-    for (i = 0; i < planned->count; i++) {
-        const uint16_t count =
-            read_one(file, yaml_file_item(file, node, i), &field->form, planned, words);
-
-        if (count == 0)
-            return 0;
-        words += count;
-    }
-    return 1;
-}
-
-/* --- an enumeration --- */
-
-/* Reads the number of bits, or a number as value_read reads it without a scale. Returns 0 after a
- * refusal. */
-static int read_number(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                       device_label *label)
-{
-    const uint32_t most = device_is_part(planned) ? (1u << planned->count) - 1 : 1;
-    const value_form form = {.type = planned->type, .order = planned->order};
-    const char *text, *digits, *wrong;
-    uint32_t bits = 0;
-
-    if (planned->type == MBM_TYPE_BIT) {
-        if (!yaml_file_number(file, "enumeration", node, 0, most, &bits))
-            return 0;
-        label->words[0] = (uint16_t)bits;
-        return 1;
-    }
-    text = yaml_file_decimal(file, "enumeration", node);
-    if (!text)
-        return 0;
-    digits = text + (text[0] == '-');
-    if (digits[0] == '\0' || digits[strspn(digits, "0123456789")] != '\0')
-        return yaml_file_refuse(file, node, "enumeration: \"%s\" is not a whole decimal number",
-                                text);
-    if (value_read(&form, text, strlen(text), label->words, &wrong) == 0)
-        return yaml_file_refuse(file, node, "enumeration: \"%s\" is out of range of %s", text,
-                                value_type_names[planned->type]);
-    return 1;
-}
-
-/* Reads a number and its name, which must not be there yet. Returns 0 after a refusal. */
-static int read_label(yaml_file *file, yaml_file_pair pair, const mbm_planField *planned,
-                      device_field *field)
-{
-    device_label *label = &field->labels[field->label_count++];
-    const size_t size = value_registers(planned->type, 1) * sizeof *label->words;
-    const device_label *other;
-
-    label->line = (int)yaml_file_line(pair.key);
-    if (!read_number(file, pair.key, planned, label) ||
-        !yaml_file_copy(file, "enumeration", pair.key, VALUE_LONGEST, &label->number) ||
-        !yaml_file_copy(file, "enumeration", pair.value, DEVICE_NAME_BYTES, &label->name))
-        return 0;
-    for (other = field->labels; other < label; other++) {
-        if (memcmp(other->words, label->words, size) == 0)
-            return yaml_file_refuse(file, pair.key,
-                                    "enumeration has the number %s twice, first in line %d",
-                                    label->number, other->line);
-        if (other->name && label->name && strcmp(other->name, label->name) == 0)
-            return yaml_file_refuse(file, pair.value,
-                                    "enumeration has the name %s twice, first in line %d",
-                                    label->name, other->line);
-    }
-    return 1;
-}
-
-static int read_enumeration(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                            device_field *field)
-{
-    size_t count, at;
-
-    if (!node)
-        return 1;
-    if (planned->type >= MBM_TYPE_FLOAT)
-        return yaml_file_refuse(file, node,
-                                "a %s has no enumeration: only integers and bits have one",
-                                value_type_names[planned->type]);
-    if (field->form.scale.digits != 0 || field->power_name)
-        return yaml_file_refuse(file, node, "a field with a scale has no enumeration");
-    if (field->conversion && field->conversion->offset.digits != 0)
-        return yaml_file_refuse(file, node, "a field with an offset has no enumeration");
-    if (field->conversion && field->conversion->has_precision)
-        return yaml_file_refuse(file, node, "a field with a precision has no enumeration");
-    count = yaml_file_pairs(file, "enumeration", node, MOST_LABELS,
-                            "numbers to names, such as {0: stopped, 1: running}");
-    if (count == 0)
-        return 0;
-    field->labels = (device_label *)calloc(count, sizeof *field->labels);
-    if (!field->labels)
-        return yaml_file_fail(file, ENOMEM);
-    for (at = 0; at < count; at++)
-        if (!read_label(file, yaml_file_pair_at(file, node, at), planned, field))
-            return 0;
-    return 1;
-}
-
 /* --- the fields together --- */
 
 /* Returns whether two fields have an address in common for which the file gives other values. */
 static int is_contradiction(const device *of, uint16_t one, uint16_t other)
 {
     const mbm_planField *a = &of->planned[one], *b = &of->planned[other];
-    const uint16_t mask = device_mask(a) & device_mask(b);
     const uint32_t end_a = a->address + device_size(a), end_b = b->address + device_size(b);
     uint32_t at = a->address > b->address ? a->address : b->address;
 
     if (a->unit != b->unit || a->table != b->table || !of->fields[one].words ||
         !of->fields[other].words)
         return 0;
-    for (; at < end_a && at < end_b; at++)
-        if ((of->fields[one].words[at - a->address] ^ of->fields[other].words[at - b->address]) &
-            mask)
+    for (; at < end_a && at < end_b; at++) {
+        const uint32_t in_a = at - a->address, in_b = at - b->address;
+        const uint16_t mask = device_mask(a, in_a) & device_mask(b, in_b);
+
+        if ((of->fields[one].words[in_a] ^ of->fields[other].words[in_b]) & mask)
             return 1;
+    }
     return 0;
 }
 
@@ -484,10 +317,10 @@ static int read_late(yaml_file *file, device *into)
     for (i = 0; i < into->count; i++) {
         device_field *field = &into->fields[i];
 
-        if (field->power_name &&
-            (!device_values_find_power(file, into, i) ||
-             !read_value(file, (const yaml_node_t *)field->late_value, &into->planned[i], field) ||
-             !check_value(file, into, i, into->count)))
+        if (field->power_name && (!device_values_find_power(file, into, i) ||
+                                  !device_initial_read(file, (const yaml_node_t *)field->late_value,
+                                                       &into->planned[i], field) ||
+                                  !check_value(file, into, i, into->count)))
             return 0;
         field->late_value = NULL;
     }
@@ -499,6 +332,7 @@ typedef struct head {
     mbm_planField planned;
     uint8_t write_function;
     const yaml_node_t *not_available;
+    int16_t zone; /* of the device's clock, in minutes east of UTC */
 } head;
 
 /* Reads the value of a field, or keeps it for read_late. */
@@ -506,7 +340,7 @@ static int read_or_keep_value(yaml_file *file, const yaml_node_t *node,
                               const mbm_planField *planned, device_field *field)
 {
     field->late_value = field->power_name ? node : NULL;
-    return field->power_name || read_value(file, node, planned, field);
+    return field->power_name || device_initial_read(file, node, planned, field);
 }
 
 /* Makes space for another field. Returns 0 after a refusal. */
@@ -533,6 +367,7 @@ static int grow(yaml_file *file, const yaml_node_t *node, device *into)
 static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_t *const *values,
                       const head *shared, uint32_t offset, device *into)
 {
+    const device_type_keys keys = keys_of_type(values);
     device_field *field;
     mbm_planField *planned;
 
@@ -552,13 +387,15 @@ static int read_field(yaml_file *file, const yaml_node_t *node, const yaml_node_
            yaml_file_copy(file, "description", values[DESCRIPTION], MOST_DESCRIPTION,
                           &field->description) &&
            read_address(file, node, values, into, offset, planned) &&
-           read_type(file, node, values, planned) && read_size(file, node, values, into, planned) &&
+           read_type(file, node, values, planned, field) &&
+           read_size(file, node, values, into, planned) &&
            read_shared(file, values[FIELD_UNIT], values[INTERVAL], values[ORDER], planned) &&
+           device_types_complete(file, &keys, shared->zone, planned, field) &&
            read_access(file, values[ACCESS], planned, into->writes_masks, field) &&
            device_limits_check(file, node, values[WRITE_FUNCTION], into, planned, field) &&
            read_meaning(file, values, shared->not_available, planned, field) &&
            read_or_keep_value(file, values[VALUE], planned, field) &&
-           read_enumeration(file, values[ENUMERATION], planned, field) &&
+           device_labels_read(file, values[ENUMERATION], planned, field) &&
            device_home_read(file, values[DEVICE_CLASS], values[STATE_CLASS], values[PRESS], planned,
                             field) &&
            check_others(file, node, into);
@@ -679,6 +516,7 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
         !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks) ||
         !device_address_read_notation(file, values[NOTATION], values[ONE_BASED], into) ||
         !device_limits_read_function(file, values[DEVICE_WRITE_FUNCTION], &shared.write_function) ||
+        !device_types_read_zone(file, values[DEVICE_TIME_ZONE], &shared.zone) ||
         !device_limits_read(file, values + LIMITS, into))
         return 0;
     into->writes_masks = (uint8_t)writes_masks;

@@ -162,7 +162,7 @@ static int check_press(yaml_file *file, const yaml_node_t *node, const mbm_planF
     int index;
     const char *wrong;
 
-    if (planned->type == MBM_TYPE_TEXT) {
+    if (value_is_text(planned->type)) {
         if (strlen(field->press) > planned->count)
             return yaml_file_refuse(file, node, "press has %zu characters, and count is %u",
                                     strlen(field->press), planned->count);

@@ -13,8 +13,9 @@ int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t re
 {
     const device_limits *limits = &of->limits;
     const uint16_t count = of->readable;
+    mbm_planField *fields;
+    uint16_t i;
 
-    setup->fields = of->planned;
     setup->fieldCount = setup->readCount = count;
     setup->dataWords = UINT16_MAX;
     setup->bitGap = limits->bit_gap;
@@ -28,11 +29,15 @@ int device_plan_make(mbm_planSetup *setup, const device *of, int gap, uint8_t re
     setup->excluded = limits->excluded;
     setup->excludedCount = limits->excluded_count;
     setup->requestCount = requests;
+    fields = (mbm_planField *)calloc(count, sizeof *fields);
+    for (i = 0; fields && i < count; i++)
+        fields[i] = device_read_as(&of->planned[i]);
+    setup->fields = fields;
     setup->positions = (mbm_planPosition *)calloc(count, sizeof *setup->positions);
     setup->reads = (mbm_planRead *)calloc(count, sizeof *setup->reads);
     setup->data = (uint16_t *)calloc(setup->dataWords, sizeof *setup->data);
     setup->requests = (mbm_clientRequest *)calloc(requests, sizeof *setup->requests);
-    return setup->positions && setup->reads && setup->data && setup->requests;
+    return fields && setup->positions && setup->reads && setup->data && setup->requests;
 }
 
 int device_plan_split(mbm_planSplitting *splitting, const mbm_planSetup *setup)
@@ -49,6 +54,7 @@ int device_plan_is_refused(uint8_t status)
 
 void device_plan_free(mbm_planSetup *setup)
 {
+    free((void *)(uintptr_t)setup->fields);
     free(setup->positions);
     free(setup->reads);
     free(setup->data);
@@ -144,8 +150,8 @@ static uint8_t print_bits(const mbm_planField *planned, const value_form *form, 
     return conversion_print(&as, &registers, 0, 1, is_json, text);
 }
 
-/* Writes one value of a field. Returns MBM_OK; MBM_NOT_AVAILABLE with null in JSON, and else an
- * empty text; MBM_PENDING if no value has arrived yet. */
+/* Writes one value of a field. Returns MBM_OK; MBM_NOT_AVAILABLE or MBM_MALFORMED_VALUE with null
+ * in JSON, and else an empty text; MBM_PENDING if no value has arrived yet. */
 static uint8_t print_one(mbm_plan *plan, const device *of, uint16_t field, uint16_t index,
                          int is_json, char text[VALUE_TEXT_BYTES])
 {
@@ -174,19 +180,23 @@ static uint8_t print_one(mbm_plan *plan, const device *of, uint16_t field, uint1
 uint8_t device_plan_status(mbm_plan *plan, const device *of, uint16_t field, uint32_t *ageMs)
 {
     const uint8_t status = mbm_plan_getStatus(plan, field, ageMs);
-    const uint16_t count = device_plan_count(&of->planned[field]);
+    const uint16_t count = device_values_in(&of->planned[field]);
     char text[VALUE_TEXT_BYTES];
     uint16_t index;
+    uint8_t one = status;
 
-    for (index = 0; status == MBM_OK && index < count; index++)
-        if (print_one(plan, of, field, index, 0, text) != MBM_NOT_AVAILABLE)
+    /* One value of several suffices. */
+    for (index = 0; status == MBM_OK && index < count; index++) {
+        one = print_one(plan, of, field, index, 0, text);
+        if (one == MBM_OK || one == MBM_PENDING)
             return status;
-    return status == MBM_OK ? MBM_NOT_AVAILABLE : status;
+    }
+    return one;
 }
 
-uint16_t device_plan_count(const mbm_planField *planned)
+int device_plan_is_read(uint8_t status)
 {
-    return planned->type == MBM_TYPE_TEXT || device_is_part(planned) ? 1 : planned->count;
+    return status == MBM_OK || status == MBM_NOT_AVAILABLE || status == MBM_MALFORMED_VALUE;
 }
 
 const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t field, uint16_t index)
@@ -206,10 +216,12 @@ const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t fi
     } else {
         if (mbm_plan_getRegisters(plan, field, &registers) != MBM_OK)
             return NULL;
-        for (i = 0; i < size; i++)
+        for (i = 0; i < size; i++) {
             (void)mbm_registers_getUint16(&registers,
                                           (uint16_t)(planned->address + index * size + i),
                                           MBM_ORDER_ABCD, &words[i]);
+            words[i] &= device_mask(planned, i);
+        }
     }
     return device_label_of(of, field, words);
 }
@@ -217,7 +229,7 @@ const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t fi
 int device_plan_text(mbm_plan *plan, const device *of, uint16_t field, int is_json,
                      const char *none, char text[DEVICE_TEXT_LONGEST])
 {
-    const uint16_t count = device_plan_count(&of->planned[field]);
+    const uint16_t count = device_values_in(&of->planned[field]);
     const int is_array = is_json && count > 1;
     size_t length = 0;
     uint16_t index;
@@ -230,7 +242,7 @@ int device_plan_text(mbm_plan *plan, const device *of, uint16_t field, int is_js
         if (status == MBM_PENDING)
             return 0;
         length += (size_t)snprintf(text + length, DEVICE_TEXT_LONGEST - length, "%s%s", before,
-                                   status == MBM_NOT_AVAILABLE && !is_json ? none : one);
+                                   status != MBM_OK && !is_json ? none : one);
     }
     if (is_array)
         strcpy(text + length, "]");

@@ -39,16 +39,16 @@ enum { DEVICE_TEXT_LONGEST = 16384 };
 int device_plan_text(mbm_plan *plan, const device *of, uint16_t field, int is_json,
                      const char *none, char text[DEVICE_TEXT_LONGEST]);
 
-/* As mbm_plan_getStatus, and MBM_NOT_AVAILABLE if the last read has ended well, and none of the
- * values of the field is available. `ageMs` may be NULL. */
+/* As mbm_plan_getStatus, and MBM_NOT_AVAILABLE or MBM_MALFORMED_VALUE if the last read has ended
+ * well, and the registers have none of the values of the field. `ageMs` may be NULL. */
 uint8_t device_plan_status(mbm_plan *plan, const device *of, uint16_t field, uint32_t *ageMs);
+
+/* Whether a status of device_plan_status says that the last read has ended well. */
+int device_plan_is_read(uint8_t status);
 
 /* Sets the form of a field's values as they are now: with the power of ten that another field has.
  * Returns MBM_OK; MBM_NOT_AVAILABLE if that field has none. */
 uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value_form *form);
-
-/* How many values a field has: several numbers in a row or bits of a table; otherwise 1. */
-uint16_t device_plan_count(const mbm_planField *planned);
 
 /* Returns the name that the enumeration of a field has for one of its values. NULL if it has none,
  * or if no value has arrived yet. */

@@ -37,8 +37,8 @@ static int is_bit(const mbm_planField *planned)
 static int check_number(yaml_file *file, const char *key, const yaml_node_t *node,
                         const mbm_planField *planned)
 {
-    return (!is_bit(planned) && planned->type != MBM_TYPE_TEXT) ||
-           yaml_file_refuse(file, node, "a %s has no %s", value_type_names[planned->type], key);
+    return (!is_bit(planned) && !value_is_text(planned->type) && !value_is_date(planned->type)) ||
+           yaml_file_refuse(file, node, "a %s has no %s", value_type_name(planned->type), key);
 }
 
 /* Whether a text is meant to be a number. */
@@ -53,8 +53,6 @@ static int read_scale(yaml_file *file, const yaml_node_t *node, const mbm_planFi
 {
     const char *text;
 
-    field->form.type = planned->type;
-    field->form.order = planned->order;
     if (!node)
         return 1;
     field->scale_line = (int)yaml_file_line(node);
@@ -108,9 +106,9 @@ static int read_limit(yaml_file *file, const char *key, const yaml_node_t *node,
 {
     const char *text;
 
-    if (planned->type == MBM_TYPE_TEXT || (is_bit(planned) && planned->count == 1) ||
-        planned->table <= MBM_TABLE_DISCRETE_INPUTS)
-        return yaml_file_refuse(file, node, "a %s has no %s", value_type_names[planned->type], key);
+    if (value_is_text(planned->type) || value_is_date(planned->type) ||
+        (is_bit(planned) && planned->count == 1) || planned->table <= MBM_TABLE_DISCRETE_INPUTS)
+        return yaml_file_refuse(file, node, "a %s has no %s", value_type_name(planned->type), key);
     if (!(field->access & DEVICE_WRITE))
         return yaml_file_refuse(file, node,
                                 "%s is for what is written, and the field cannot be written: a "
@@ -165,7 +163,7 @@ static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
                       const mbm_planField *planned, device_field *field)
 {
     const char *text = yaml_file_text(file, "not_available", node, VALUE_LONGEST);
-    value_form form = {.type = field->form.type, .order = field->form.order};
+    value_form form = field->form;
     conversion *of = field->conversion;
     const char *wrong;
     int is_hex;
@@ -182,7 +180,7 @@ static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
         form.order = MBM_ORDER_ABCD;
     }
     is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
-    if (planned->type == MBM_TYPE_TEXT ||
+    if (value_is_text(planned->type) ||
         (is_shared && is_hex && strlen(text) - 2 != hex_digits(planned, field)))
         return is_shared ||
                yaml_file_refuse(file, node,
@@ -197,7 +195,7 @@ static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
            yaml_file_refuse(file, node, "not_available: \"%s\" %s%s%s", text, wrong,
                             strstr(wrong, "range") ? " of " : "",
                             strstr(wrong, "range")
-                                ? is_bit(planned) ? "these bits" : value_type_names[form.type]
+                                ? is_bit(planned) ? "these bits" : value_type_name(form.type)
                                 : ": it is " NUMBERS_OR_WORDS);
 }
 

@@ -66,27 +66,18 @@ void discovery_topic(const discovery_line *line, const device *of, uint16_t fiel
 /* The greatest numbers that a type holds, as Home Assistant's floats show them exactly. */
 static void range_of(const mbm_planField *planned, double *least, double *most)
 {
-    static const double EXACT = 9007199254740992.0, FLOAT = 3.4028234663852886e38;
+    static const double EXACT = 9007199254740992.0, FLOAT = 3.4028234663852886e38, HALF = 65504;
+    const value_range range = value_range_of(planned->type);
 
-    *least = 0;
-    switch (planned->type) {
-    case MBM_TYPE_BIT: *most = (double)((1u << planned->count) - 1); return;
-    case MBM_TYPE_UINT16: *most = UINT16_MAX; return;
-    case MBM_TYPE_UINT32: *most = UINT32_MAX; return;
-    case MBM_TYPE_UINT64: *most = EXACT; return;
-    case MBM_TYPE_INT16:
-        *least = INT16_MIN;
-        *most = INT16_MAX;
-        return;
-    case MBM_TYPE_INT32:
-        *least = INT32_MIN;
-        *most = INT32_MAX;
-        return;
-    case MBM_TYPE_INT64:
-        *least = -EXACT;
-        *most = EXACT;
-        return;
-    default: *least = -FLOAT; *most = FLOAT;
+    if (planned->type == MBM_TYPE_BIT) {
+        *least = 0;
+        *most = (double)((1u << planned->count) - 1);
+    } else if (value_is_float(planned->type)) {
+        *most = planned->type == VALUE_FLOAT16 ? HALF : FLOAT;
+        *least = -*most;
+    } else {
+        *least = range.below_zero > 0 ? -fmin((double)range.below_zero, EXACT) : 0;
+        *most = fmin((double)range.most, EXACT);
     }
 }
 
@@ -103,7 +94,7 @@ static double or_more(double number, double other)
 /* Adds what a number may be: what its type holds, or the limits of the file. */
 static void add_range(cJSON *to, const device_field *field, const mbm_planField *planned)
 {
-    const int is_float = planned->type == MBM_TYPE_FLOAT || planned->type == MBM_TYPE_DOUBLE;
+    const int is_float = value_is_float(planned->type);
     const double scale = field->form.scale.digits != 0 ? field->form.scale.value : 1;
     const conversion *of = field->conversion;
     double least, most, other, step = is_float ? 0.001 : fabs(scale);
@@ -194,7 +185,7 @@ static const char *template_of(const mbm_planField *planned, int is_plain)
         return home_is_several(planned) ? "{{ value[:255] }}" : NULL;
     if (home_is_several(planned))
         return "{{ ((value_json.value or []) | join(','))[:255] }}";
-    if (planned->type == MBM_TYPE_TEXT)
+    if (value_is_text(planned->type))
         return "{{ value_json.value or '' }}";
     return "{{ value_json.value }}";
 }
@@ -284,7 +275,7 @@ static void add_press(cJSON *to, const device_field *one, const mbm_planField *p
 
     if (literal)
         cJSON_AddStringToObject(to, "payload_press",
-                                planned->type == MBM_TYPE_TEXT ? literal : one->press);
+                                value_is_text(planned->type) ? literal : one->press);
     cJSON_free(literal);
     cJSON_Delete(string);
 }
@@ -334,7 +325,7 @@ static void add_command(cJSON *to, const discovery_line *line, const device *of,
         return;
     default: break;
     }
-    if (planned->type != MBM_TYPE_TEXT)
+    if (!value_is_text(planned->type))
         return;
     cJSON_AddNumberToObject(to, "max", planned->count);
     /* A JSON string is the text, whatever its first character is. */

@@ -372,14 +372,14 @@ static int begin_plan(header *h, const mbm_planSetup *setup)
     return is_noted ? CODE_DONE : report(CODE_SYSTEM, REPORT_NO_MEMORY);
 }
 
-/* Copies the fields that can be read, with their scales. */
+/* Gives the fields of a plan their scales. Registers as they are have none. */
 static void scale_fields(const header *h, mbm_planField *fields)
 {
     uint16_t i;
 
     for (i = 0; i < h->of->readable; i++) {
-        fields[i] = h->of->planned[i];
-        if (h->scales && header_is_scaled(&h->of->fields[i])) {
+        if (h->scales && header_is_scaled(&h->of->fields[i]) &&
+            fields[i].type != MBM_TYPE_REGISTERS) {
             fields[i].multiplier = h->scales[i].multiplier;
             fields[i].divisor = h->scales[i].divisor;
         }
@@ -391,21 +391,17 @@ static void scale_fields(const header *h, mbm_planField *fields)
 static int group_fields(header *h)
 {
     const uint16_t count = h->of->readable;
-    mbm_planField *fields;
     mbm_planSetup setup = MBM_INIT;
     int code;
 
     if (count == 0)
         return CODE_DONE;
-    fields = (mbm_planField *)calloc(count, sizeof *fields);
-    if (device_plan_make(&setup, h->of, h->gap, 1) && fields) {
-        scale_fields(h, fields);
-        setup.fields = fields;
+    if (device_plan_make(&setup, h->of, h->gap, 1)) {
+        scale_fields(h, (mbm_planField *)(uintptr_t)setup.fields);
         code = begin_plan(h, &setup);
     } else {
         code = report(CODE_SYSTEM, REPORT_NO_MEMORY);
     }
-    free(fields);
     device_plan_free(&setup);
     return code;
 }
@@ -442,7 +438,10 @@ static int write_header(job *j, header *h)
         " * Define %s_SERVER for the tables of a server, and functions that get and set fields. */\n"
         "#ifndef %s_H\n#define %s_H\n\n#include <stddef.h>\n#include <stdint.h>\n",
         h->upper, h->upper, h->upper);
-    if (!header_write_fields(h) || !header_write_plan(h) || !header_write_server(h))
+    if (!header_write_fields(h) || !header_write_plan(h))
+        return 0;
+    header_write_types(h);
+    if (!header_write_server(h))
         return 0;
     fprintf(h->out, "\n#endif\n");
     return 1;

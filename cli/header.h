@@ -75,6 +75,15 @@ int header_write_fields(header *h);
 int header_write_plan(header *h);
 int header_write_server(header *h);
 
+/* Whether a field has functions of its own, because a plan does not know its type or order. */
+int header_is_special(const mbm_planField *planned);
+
+/* Writes the functions that take such fields out of registers and put them into them; and those of
+ * a server, which get and set one in the array of its table, of the addresses `first` to `last`. */
+void header_write_types(const header *h);
+void header_write_special(const header *h, uint16_t at, const char *name, const char *array,
+                          uint32_t first, uint32_t last);
+
 /* Writes the page of documentation. */
 void header_write_page(header *h);
 

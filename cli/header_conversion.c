@@ -242,7 +242,7 @@ static void write_shared(const header *h)
 /* Whether the header has a conversion for a field. */
 static int has_constant(const header *h, uint16_t at)
 {
-    return is_converted(&h->of->fields[at]) && h->of->planned[at].type <= MBM_TYPE_TEXT;
+    return is_converted(&h->of->fields[at]) && !header_is_special(&h->of->planned[at]);
 }
 
 /* Writes the conversions in the order of the fields of the plan. */

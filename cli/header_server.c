@@ -86,12 +86,12 @@ static void find_cells(const header *h, uint16_t unit, uint8_t table, cells *int
     for (i = 0; i < h->of->count; i++) {
         const mbm_planField *planned = &h->of->planned[i];
         const device_field *field = &h->of->fields[i];
-        const uint16_t mask = device_mask(planned);
 
         if (planned->unit != unit || planned->table != table)
             continue;
         for (at = 0; at < device_size(planned); at++) {
             const uint32_t address = planned->address + at;
+            const uint16_t mask = device_mask(planned, at);
 
             into->has[address] = (uint8_t)(into->has[address] | HAS_CELL |
                                            (field->access & DEVICE_READ ? HAS_READ : 0) |
@@ -478,7 +478,11 @@ static int write_functions(const header *h, const cells *of)
         fprintf(h->out, "\n/* ");
         header_comment(h->out, h->of->fields[i].name);
         fprintf(h->out, " */");
-        if (device_is_part(planned))
+        if (header_is_special(planned))
+            header_write_special(h, i, name, of->names[part_of(of, planned->address)],
+                                 of->first[part_of(of, planned->address)],
+                                 of->last[part_of(of, planned->address)]);
+        else if (device_is_part(planned))
             write_bits(h, planned, of, name);
         else if (planned->type == MBM_TYPE_BIT)
             write_bit(h, planned, of, name);
@@ -494,7 +498,7 @@ static int write_functions(const header *h, const cells *of)
 /* Whether the functions of a field swap bytes themselves. */
 static int needs_swap(const mbm_planField *planned)
 {
-    return is_swapped(planned) && planned->type < MBM_TYPE_DOUBLE &&
+    return is_swapped(planned) && planned->type < MBM_TYPE_DOUBLE && !header_is_special(planned) &&
            !(planned->type == MBM_TYPE_BIT && is_bits(planned->table));
 }
 

@@ -40,7 +40,7 @@ void header_place(const header *h, const mbm_planField *planned)
                                       "input register"};
     const uint32_t size = device_size(planned);
 
-    if (device_is_part(planned)) {
+    if (device_is_part(planned) || device_is_wide_part(planned)) {
         fprintf(out, planned->count > 1 ? "bits %u" : "bit %u", planned->bit);
         if (planned->count > 1)
             fprintf(out, " to %u", planned->bit + planned->count - 1u);
@@ -172,10 +172,15 @@ static void write_what_it_is(header *h, uint16_t at)
     if (h->unit == 0)
         fprintf(h->out, " of unit %u", planned->unit);
     if (planned->type != MBM_TYPE_BIT)
-        fprintf(h->out, ", %s", value_type_names[planned->type]);
-    if (planned->type == MBM_TYPE_TEXT)
+        fprintf(h->out, ", %s", value_type_name(planned->type));
+    if (field->layout)
+        fprintf(h->out, " \"%s\"", field->layout);
+    if (field->form.zone != 0)
+        fprintf(h->out, ", at %c%02d:%02d", field->form.zone < 0 ? '-' : '+',
+                abs(field->form.zone) / 60, abs(field->form.zone) % 60);
+    if (value_is_text(planned->type))
         fprintf(h->out, " of %u characters", planned->count);
-    else if (planned->count > 1 && !device_is_part(planned))
+    else if (device_values_in(planned) > 1)
         fprintf(h->out, ", %u values", planned->count);
     if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
         fprintf(h->out, ", order %s", value_order_names[planned->order]);
@@ -210,15 +215,15 @@ static int write_field(header *h, uint16_t at)
     const mbm_planField *planned = &h->of->planned[at];
     const device_field *field = &h->of->fields[at];
     const header_scale *scale = &h->scales[at];
+    const int is_part = device_is_part(planned) || device_is_wide_part(planned);
 
     write_what_it_is(h, at);
     if ((h->unit == 0 && !write_macro(h, at, "_UNIT", planned->unit)) ||
         !write_macro(h, at, "_ADDRESS", planned->address) ||
         !write_macro(h, at, "_SIZE", device_size(planned)) ||
-        (planned->count > 1 && !device_is_part(planned) &&
-         !write_macro(h, at, "_COUNT", planned->count)) ||
-        (device_is_part(planned) && (!write_macro(h, at, "_BIT", planned->bit) ||
-                                     !write_macro(h, at, "_BITS", planned->count))))
+        (planned->count > 1 && !is_part && !write_macro(h, at, "_COUNT", planned->count)) ||
+        (is_part && (!write_macro(h, at, "_BIT", planned->bit) ||
+                     !write_macro(h, at, "_BITS", planned->count))))
         return 0;
     if (header_is_scaled(field)) {
         fprintf(h->out, "#define %s_%s_MULTIPLIER ", h->upper, h->fields[at]);
@@ -258,11 +263,13 @@ static void write_row(header *h, uint16_t at, int is_last)
 {
     static const char *const TABLES[] = {"", "COILS", "DISCRETE_INPUTS", "HOLDING_REGISTERS",
                                          "INPUT_REGISTERS"};
-    static const char *const TYPES[] = {"",       "BIT",   "UINT16", "INT16",  "UINT32", "INT32",
-                                        "UINT64", "INT64", "FLOAT",  "DOUBLE", "TEXT"};
-    const mbm_planField *planned = &h->of->planned[at];
+    static const char *const TYPES[] = {"",       "BIT",    "UINT16", "INT16",
+                                        "UINT32", "INT32",  "UINT64", "INT64",
+                                        "FLOAT",  "DOUBLE", "TEXT",   "REGISTERS"};
+    const mbm_planField own = device_read_as(&h->of->planned[at]), *planned = &own;
     const header_scale *scale = &h->scales[at];
-    const int is_scaled = header_is_scaled(&h->of->fields[at]);
+    const int is_scaled =
+        header_is_scaled(&h->of->fields[at]) && planned->type != MBM_TYPE_REGISTERS;
 
     fprintf(h->out, "    /* %s_%s */\n", h->upper, h->fields[at]);
     fprintf(h->out,
@@ -362,10 +369,10 @@ static void write_page_row(const header *h, uint16_t at)
     if (h->unit == 0)
         fprintf(h->out, "%u | ", planned->unit);
     header_place(h, planned);
-    fprintf(h->out, " | %s", value_type_names[planned->type]);
-    if (planned->type == MBM_TYPE_TEXT)
+    fprintf(h->out, " | %s", value_type_name(planned->type));
+    if (value_is_text(planned->type))
         fprintf(h->out, ", %u characters", planned->count);
-    else if (planned->count > 1 && !device_is_part(planned))
+    else if (device_values_in(planned) > 1)
         fprintf(h->out, ", %u values", planned->count);
     if (planned->order != MBM_ORDER_ABCD && planned->type != MBM_TYPE_BIT)
         fprintf(h->out, ", %s", value_order_names[planned->order]);

@@ -21,7 +21,7 @@ int home_is_bit(const mbm_planField *planned)
 
 int home_is_several(const mbm_planField *planned)
 {
-    return planned->type != MBM_TYPE_TEXT && !device_is_part(planned) && planned->count > 1;
+    return device_values_in(planned) > 1;
 }
 
 /* The numbers of an enumeration have no scale. */
@@ -33,8 +33,8 @@ int home_has_names(const device_field *field, const mbm_planField *planned)
 
 int home_is_number(const device_field *field, const mbm_planField *planned)
 {
-    return planned->type != MBM_TYPE_TEXT && !home_is_bit(planned) && !home_is_several(planned) &&
-           !home_has_names(field, planned);
+    return !value_is_text(planned->type) && !value_is_date(planned->type) &&
+           !home_is_bit(planned) && !home_is_several(planned) && !home_has_names(field, planned);
 }
 
 int home_component(const device_field *field, const mbm_planField *planned)
@@ -46,7 +46,9 @@ int home_component(const device_field *field, const mbm_planField *planned)
     /* Several values are a text if they are written: Home Assistant has no list of numbers. */
     if (home_is_several(planned))
         return is_written ? HOME_TEXT : HOME_SENSOR;
-    if (planned->type == MBM_TYPE_TEXT)
+    if (value_is_date(planned->type))
+        return is_written ? HOME_TEXT : HOME_SENSOR;
+    if (value_is_text(planned->type))
         return is_written && planned->count <= LONGEST_TEXT ? HOME_TEXT : HOME_SENSOR;
     if (home_is_bit(planned))
         return is_written ? HOME_SWITCH : HOME_BINARY_SENSOR;

@@ -10,6 +10,7 @@
 #include "place.h"
 #include "report.h"
 #include "trace.h"
+#include "value_dates.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -28,7 +29,9 @@ enum {
     SCALE,
     OFFSET,
     HEX,
-    ONE_BASED
+    ONE_BASED,
+    LAYOUT,
+    TIME_ZONE
 };
 
 client_options options = {.timeoutMs = 1000,
@@ -260,24 +263,53 @@ const struct argp options_unit = {.options = unit_texts, .parser = parse_unit};
 
 /* --- values --- */
 
+/* Whether layout and time zone go with the type, and the order with the registers of a value. */
+static void fit_date(const struct argp_state *state)
+{
+    const int is_bcd = options.form.type == VALUE_DATE_BCD;
+    const int has_layout = is_bcd || options.form.type == VALUE_DATE;
+    const char *wrong;
+    uint8_t registers = 1;
+
+    if (options.form.zone != 0 && !value_is_date(options.form.type))
+        options_wrong(state, "--time-zone is for dates");
+    if (has_layout != (options.form.layout != NULL))
+        options_wrong(state,
+                      has_layout ? "the type %s needs --layout, such as \"Y M D h m s\""
+                                 : "--layout is for the types date and date_bcd, not for %s",
+                      value_type_name(options.form.type));
+    if (has_layout) {
+        wrong = value_layout_check(options.form.layout, &registers);
+        if (wrong)
+            options_wrong(state, "--layout %s", wrong);
+        options.form.type =
+            (uint8_t)((is_bcd ? VALUE_DATE_BCD_OF_1 : VALUE_DATE_OF_1) + registers - 1);
+    }
+    if (options.form.order > MBM_ORDER_DCBA &&
+        (value_is_text(options.form.type) || has_layout || options.form.type == VALUE_IEC870 ||
+         value_registers(options.form.type, 1) != 4))
+        options_wrong(state, "--order %s is for values of four registers",
+                      value_order_names[options.form.order]);
+}
+
 static void fit_type(const struct argp_state *state)
 {
     const int is_bits =
         options.table == MBM_TABLE_COILS || options.table == MBM_TABLE_DISCRETE_INPUTS;
+    int is_no_number;
 
     if (is_bits && !options.has_type)
         options.form.type = MBM_TYPE_BIT;
     if (is_bits != (options.form.type == MBM_TYPE_BIT))
         options_wrong(state, "the table %s has no values of type %s",
-                      value_table_names[options.table], value_type_names[options.form.type]);
-    if (options.form.scale.digits != 0 &&
-        (options.form.type == MBM_TYPE_TEXT || options.form.type == MBM_TYPE_BIT ||
-         options.form.is_hex))
-        options_wrong(state, "--scale needs a number, not a bit, a text or --hex");
-    if (options.conversion.offset.digits != 0 &&
-        (options.form.type == MBM_TYPE_TEXT || options.form.type == MBM_TYPE_BIT ||
-         options.form.is_hex))
-        options_wrong(state, "--offset needs a number, not a bit, a text or --hex");
+                      value_table_names[options.table], value_type_name(options.form.type));
+    fit_date(state);
+    is_no_number = value_is_text(options.form.type) || value_is_date(options.form.type) ||
+                   options.form.type == MBM_TYPE_BIT || options.form.is_hex;
+    if (options.form.scale.digits != 0 && is_no_number)
+        options_wrong(state, "--scale needs a number, not a bit, a text, a date or --hex");
+    if (options.conversion.offset.digits != 0 && is_no_number)
+        options_wrong(state, "--offset needs a number, not a bit, a text, a date or --hex");
     if (options.form.is_hex && options.form.type >= MBM_TYPE_FLOAT)
         options_wrong(state, "--hex needs an integer type");
 }
@@ -309,6 +341,12 @@ static error_t parse_values(int key, char *text, struct argp_state *state)
         options.form.conversion = &options.conversion;
         return 0;
     case HEX: options.form.is_hex = 1; return 0;
+    case LAYOUT: options.form.layout = text; return 0;
+    case TIME_ZONE:
+        if (!value_zone_read(text, &options.form.zone))
+            options_wrong(state, "--time-zone \"%s\" is neither Z nor an offset such as +01:00",
+                          text);
+        return 0;
     case ONE_BASED: options.is_one_based = 1; return 0;
     case ARGP_KEY_END: fit_type(state); return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -319,14 +357,19 @@ static const struct argp_option value_texts[] = {
     {"table", 't', "TABLE", 0, "coils, discrete, input or holding (holding)", 1},
     {"type", 'T', "TYPE", 0,
      "bit, uint16, int16, uint32, int32, uint64, int64, float, double or text (uint16, of coils and "
-     "discrete inputs bit)",
+     "discrete inputs bit). docs/device-file.md has more: int24 and int48, float16, sign_magnitude16, "
+     "bcd16, uint32_m10k, text_low, unix32, iec870, date and others",
      1},
     {"order", 'o', "ORDER", 0,
-     "Order of the bytes of a value: ABCD, CDAB, BADC or DCBA; A is the most significant one (ABCD)",
+     "Order of the bytes of a value: ABCD, CDAB, BADC or DCBA; A is the most significant one. Of four "
+     "registers also EFGHABCD, CDABGHEF, FEHGBADC or DCBAHGFE (ABCD)",
      1},
     {"scale", SCALE, "NUMBER", 0, "The value is the device's number times this, such as 0.1", 1},
     {"offset", OFFSET, "NUMBER", 0, "This is added to it, after the scale, such as -273.15", 1},
     {"hex", HEX, NULL, 0, "Values of integer types are hexadecimal", 1},
+    {"layout", LAYOUT, "TEXT", 0, "What the registers of a date hold, such as \"Y M D h m s\"", 1},
+    {"time-zone", TIME_ZONE, "OFFSET", 0, "The time zone of the device's clock, such as +01:00 (Z)",
+     1},
     {"one-based", ONE_BASED, NULL, 0, "ADDRESS counts from 1, as in many manuals", 1},
     {0}};
 

@@ -153,6 +153,16 @@ static int read_truth(cursor value)
     return -1;
 }
 
+/* A date, which may be a JSON string. */
+static cursor without_quotes(cursor value)
+{
+    if (value.at && value.end - value.at > 1 && *value.at == '"' && value.end[-1] == '"') {
+        value.at++;
+        value.end--;
+    }
+    return value;
+}
+
 uint16_t payload_parse(const value_form *form, const char *payload, size_t length,
                        uint16_t words[VALUE_WORDS], const char **wrong)
 {
@@ -168,15 +178,18 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
         words[0] = (uint16_t)read_truth(value);
         return 1;
     }
-    if (!value.at || !cursor_skip_number(&in) || in.at != value.end) {
+    if (value_is_date(form->type)) {
+        value = without_quotes(value);
+    } else if (!value.at || !cursor_skip_number(&in) || in.at != value.end) {
         *wrong = "the payload is no number";
         return 0;
     }
-    *wrong = conversion_check(form, value.at, (size_t)(value.end - value.at));
-    if (!*wrong)
+    *wrong = value.at ? conversion_check(form, value.at, (size_t)(value.end - value.at)) : NULL;
+    if (!*wrong && value.at)
         count = conversion_read(form, value.at, (size_t)(value.end - value.at), words, wrong);
     if (count == 0) {
-        snprintf(reason, sizeof reason, "the number %s", *wrong);
+        snprintf(reason, sizeof reason, "the %s %s", value_is_date(form->type) ? "date" : "number",
+                 *wrong ? *wrong : "is missing");
         *wrong = reason;
     }
     return count;
@@ -224,9 +237,11 @@ static unsigned long read_utf8(cursor *in)
 static const char *write_text(const value_form *form, uint16_t count, cursor in, int is_string,
                               uint16_t *words)
 {
+    static char reason[120];
     char latin[VALUE_LONGEST_TEXT + 1];
     mbm_registers registers;
     uint16_t length = 0;
+    const char *wrong;
 
     while (in.at < in.end) {
         unsigned long one;
@@ -246,9 +261,11 @@ static const char *write_text(const value_form *form, uint16_t count, cursor in,
         latin[length++] = (char)one;
     }
     latin[length] = '\0';
-    (void)mbm_registers_intoWords(&registers, words, value_registers(MBM_TYPE_TEXT, count), 0);
-    (void)mbm_registers_setString(&registers, 0, count, form->order, latin);
-    return NULL;
+    (void)mbm_registers_intoWords(&registers, words, value_registers(form->type, count), 0);
+    wrong = value_set_text(form, &registers, 0, count, latin);
+    if (wrong)
+        snprintf(reason, sizeof reason, "the text %s", wrong);
+    return wrong ? reason : NULL;
 }
 
 static const char *read_text(const value_form *form, uint16_t count, const char *payload,
@@ -315,13 +332,13 @@ uint16_t payload_parse_all(const value_form *form, uint16_t count, const char *p
 {
     const uint16_t size = value_registers(form->type, count);
 
-    if (count == 1 && form->type != MBM_TYPE_TEXT)
+    if (count == 1 && !value_is_text(form->type))
         return payload_parse(form, payload, length, words, wrong);
-    *wrong = length > PAYLOAD_LONGEST      ? "the payload is too long"
-             : length == 0                 ? "the payload is empty"
-             : form->type == MBM_TYPE_TEXT ? read_text(form, count, payload, length, words)
-                                           : read_values(form, count, payload, length, words);
+    *wrong = length > PAYLOAD_LONGEST    ? "the payload is too long"
+             : length == 0               ? "the payload is empty"
+             : value_is_text(form->type) ? read_text(form, count, payload, length, words)
+                                         : read_values(form, count, payload, length, words);
     if (*wrong)
         return 0;
-    return form->type == MBM_TYPE_TEXT ? size : (uint16_t)(size * count);
+    return value_is_text(form->type) ? size : (uint16_t)(size * count);
 }

@@ -27,7 +27,7 @@ const char *polled_status(polled *p, uint8_t status, char text[256])
  * several values; "-" stands for a value without a name. Appends nothing if no value has a name. */
 static void add_names(polled *p, uint16_t field, char *text, size_t capacity)
 {
-    const uint16_t count = device_plan_count(&p->meter.planned[field]);
+    const uint16_t count = device_values_in(&p->meter.planned[field]);
     size_t length = strlen(text);
     uint16_t i, named = 0;
 
@@ -61,7 +61,7 @@ int polled_value(polled *p, uint16_t field, char text[POLLED_VALUE_BYTES])
 /* The names of an enumeration for JSON: a text or null, or an array of these for several values. */
 static cJSON *json_names(polled *p, uint16_t field)
 {
-    const uint16_t count = device_plan_count(&p->meter.planned[field]);
+    const uint16_t count = device_values_in(&p->meter.planned[field]);
     cJSON *array = count > 1 ? cJSON_CreateArray() : NULL, *one = NULL;
     uint16_t i;
 

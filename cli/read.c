@@ -40,6 +40,7 @@ typedef struct reading {
     history *before; /* of each unit */
 
     uint16_t address, each; /* `each`: registers or bits of a value */
+    uint16_t characters;    /* of a text */
     uint32_t count, total;  /* values; registers or bits */
     part parts[PARTS];
     unsigned part_count;
@@ -74,7 +75,7 @@ static void read_not_available(const reading *r, const struct argp_state *state)
         if (strcmp(one, "standard") == 0)
             of->is_standard = 1;
         else
-            wrong = options.form.type == MBM_TYPE_TEXT
+            wrong = value_is_text(options.form.type)
                         ? "is not \"standard\", which is all that a text has"
                         : conversion_add(of, &options.form, one);
         if (wrong)
@@ -87,7 +88,7 @@ static void read_not_available(const reading *r, const struct argp_state *state)
 
 static void check_arguments(reading *r, const struct argp_state *state)
 {
-    const int is_text = options.form.type == MBM_TYPE_TEXT;
+    const int is_text = value_is_text(options.form.type);
     const int is_bits = options.form.type == MBM_TYPE_BIT;
     uint16_t most;
 
@@ -110,8 +111,10 @@ static void check_arguments(reading *r, const struct argp_state *state)
     if (r->address + r->total > ADDRESSES)
         options_wrong(state, "%u addresses from %u on end beyond the last address, 65535",
                       (unsigned)r->total, r->address);
-    if (is_text)
+    if (is_text) {
+        r->characters = (uint16_t)r->count;
         r->count = 1;
+    }
     most = is_bits ? MBM_MAX_READ_BITS : (uint16_t)(MBM_MAX_READ_REGISTERS / r->each * r->each);
     for (; r->part_count * (uint32_t)most < r->total; r->part_count++) {
         r->parts[r->part_count].first = r->part_count * (uint32_t)most;
@@ -271,19 +274,27 @@ static part *first_failed(reading *r)
 
 /* --- showing --- */
 
-/* Returns MBM_OK; MBM_NOT_AVAILABLE with null in JSON, and else an empty text. */
+/* Returns MBM_OK; MBM_NOT_AVAILABLE or MBM_MALFORMED_VALUE with null in JSON, and else an empty
+ * text. */
 static uint8_t print_value(reading *r, uint32_t value, int is_json, char text[VALUE_TEXT_BYTES])
 {
     const uint16_t first = (uint16_t)(r->address + value * r->each);
     mbm_registers registers;
 
     (void)mbm_registers_ofWords(&registers, r->words + value * r->each, r->each, first);
-    return conversion_print(&options.form, &registers, first, (uint16_t)(r->each * 2), is_json,
-                            text);
+    return conversion_print(&options.form, &registers, first, r->characters, is_json, text);
 }
 
-/* The status of all parts, in words. It is that of the first that failed; "not available" if all
- * were read, and have no value. Returns `status`. */
+/* Returns a status of print_value in words. Registers without a value of the type are a failure. */
+static const char *value_status(uint8_t status)
+{
+    if (status == MBM_MALFORMED_VALUE)
+        (void)report_note(report_code_of(status, 0));
+    return mbm_status_text(status);
+}
+
+/* The status of all parts, in words. It is that of the first that failed; that of the first value
+ * if all were read, and have no value. Returns `status`. */
 static const char *status_of_all(reading *r, char status[256])
 {
     const part *failed = first_failed(r);
@@ -294,7 +305,7 @@ static const char *status_of_all(reading *r, char status[256])
         if (print_value(r, value, 0, text) == MBM_OK)
             break;
     if (!failed && value == r->count)
-        return mbm_status_text(MBM_NOT_AVAILABLE);
+        return value_status(print_value(r, 0, 0, text));
     return line_status(&r->at, failed ? &failed->request : &r->parts[0].request, status);
 }
 
@@ -314,6 +325,7 @@ static void print_rows(reading *r, int is_table)
         const part *p = part_of(r, value);
         const uint32_t first = value * r->each;
         int is_changed;
+        uint8_t held;
 
         if (!is_read(r, value)) {
             if (is_table && p->first == first)
@@ -323,8 +335,9 @@ static void print_rows(reading *r, int is_table)
         }
         is_changed = old->has_part[p - r->parts] && memcmp(r->words + first, old->words + first,
                                                            r->each * sizeof r->words[0]) != 0;
-        if (print_value(r, value, 0, text) == MBM_NOT_AVAILABLE)
-            strcpy(text, mbm_status_text(MBM_NOT_AVAILABLE));
+        held = print_value(r, value, 0, text);
+        if (held != MBM_OK)
+            snprintf(text, sizeof text, "%s", value_status(held));
         printf("%s%5u  %s\n",
                !is_table    ? ""
                : is_changed ? "* "
@@ -385,7 +398,7 @@ static void print_csv(reading *r, const char *time)
     for (value = 0; value < r->count; value++) {
         *text = '\0';
         if (is_read(r, value))
-            (void)print_value(r, value, 0, text);
+            (void)value_status(print_value(r, value, 0, text));
         print_cell(text);
     }
     putchar('\n');
@@ -401,7 +414,7 @@ static void print_json(reading *r, const char *time)
     cJSON_AddStringToObject(all, "time", time);
     cJSON_AddNumberToObject(all, "unit", options.unit);
     cJSON_AddStringToObject(all, "table", value_table_names[options.table]);
-    cJSON_AddStringToObject(all, "type", value_type_names[options.form.type]);
+    cJSON_AddStringToObject(all, "type", value_type_name(options.form.type));
     cJSON_AddNumberToObject(
         all, "code",
         failed ? report_code_of(failed->request.status, failed->request.exception) : 0);
@@ -421,7 +434,7 @@ static void print_json(reading *r, const char *time)
 
             cJSON_AddRawToObject(one, "value", text);
             if (code != MBM_OK)
-                cJSON_AddStringToObject(one, "status", mbm_status_text(code));
+                cJSON_AddStringToObject(one, "status", value_status(code));
         } else {
             cJSON_AddNumberToObject(one, "count", (double)p->quantity / r->each);
             cJSON_AddStringToObject(one, "status", line_status(&r->at, &p->request, status));

@@ -150,7 +150,8 @@ int report_code_of(uint8_t status, uint8_t exception)
     case MBM_INVALID_FUNCTION:
     case MBM_MALFORMED_REPLY:
     case MBM_BUFFER_TOO_SMALL:
-    case MBM_NO_PROGRESS: return CODE_DAMAGED;
+    case MBM_NO_PROGRESS:
+    case MBM_MALFORMED_VALUE: return CODE_DAMAGED;
     default: return CODE_WRONG;
     }
 }

@@ -234,7 +234,6 @@ int served_make_units(served_units *units, enum served_kind kind, const uint8_t 
 static void add_field(served_units *units, const device_field *field, const mbm_planField *planned)
 {
     const uint32_t size = device_size(planned);
-    const uint16_t mask = device_mask(planned);
     served_cells *cells;
     uint8_t unit = 0;
     uint32_t i;
@@ -244,6 +243,7 @@ static void add_field(served_units *units, const device_field *field, const mbm_
     cells = &units->cells[unit][planned->table - 1];
     for (i = 0; i < size; i++) {
         const uint16_t address = (uint16_t)(planned->address + i);
+        const uint16_t mask = device_mask(planned, i);
 
         if (field->words)
             cells->values[address] = (uint16_t)((cells->values[address] & ~mask) | field->words[i]);

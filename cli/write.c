@@ -31,19 +31,22 @@ enum { MULTIPLE = 1, WRITE_FUNCTION };
 
 static void read_text(writing *w, const struct argp_state *state, const char *text)
 {
+    const int is_pair = value_registers(options.form.type, 2) == 1;
+    const unsigned most = (is_pair ? 2u : 1u) * MBM_MAX_WRITE_REGISTERS;
     mbm_registers registers;
-    const char *c;
+    const char *c, *wrong;
 
     for (c = text; *c; c++)
         if (!isascii((unsigned char)*c))
             options_wrong(state, "VALUE \"%s\" is not ASCII text", text);
-    if (w->value_count != 1 || strlen(text) > 2 * MBM_MAX_WRITE_REGISTERS || !*text)
-        options_wrong(state, "a write has one text, of 1 to %d characters",
-                      2 * MBM_MAX_WRITE_REGISTERS);
-    w->total = value_registers(MBM_TYPE_TEXT, (uint16_t)strlen(text));
+    if (w->value_count != 1 || strlen(text) > most || !*text)
+        options_wrong(state, "a write has one text, of 1 to %u characters", most);
+    w->total = value_registers(options.form.type, (uint16_t)strlen(text));
     (void)mbm_registers_intoWords(&registers, w->words, w->total, 0);
-    (void)mbm_registers_setString(&registers, 0, (uint16_t)(2 * w->total), options.form.order,
-                                  text);
+    wrong = value_set_text(&options.form, &registers, 0,
+                           (uint16_t)(is_pair ? 2 * w->total : w->total), text);
+    if (wrong)
+        options_wrong(state, "VALUE \"%s\" %s", text, wrong);
 }
 
 static void read_number(writing *w, const struct argp_state *state, const char *text)
@@ -57,7 +60,7 @@ static void read_number(writing *w, const struct argp_state *state, const char *
     if (added == 0)
         options_wrong(state, "VALUE \"%s\" %s%s%s", text, wrong,
                       strstr(wrong, "range") ? " of the type " : "",
-                      strstr(wrong, "range") ? value_type_names[options.form.type] : "");
+                      strstr(wrong, "range") ? value_type_name(options.form.type) : "");
     w->total = (uint16_t)(w->total + added);
 }
 
@@ -77,7 +80,7 @@ static void check_arguments(writing *w, const struct argp_state *state)
                       value_table_names[options.table]);
     options_check_unit(state, &w->where, 1);
     w->address = options_address(state, w->address_text);
-    if (options.form.type == MBM_TYPE_TEXT)
+    if (value_is_text(options.form.type))
         read_text(w, state, w->value_texts[0]);
     else
         for (i = 0; i < w->value_count && w->total <= most; i++)

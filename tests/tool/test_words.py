@@ -40,7 +40,7 @@ call rtu+tcp://127.0.0.1:1 03 --unit 0|--unit 0 means all units
 identify rtu:/dev/null --unit 0|--unit 0 means all units
 read @LINE 1 --table coil|--table "coil" is not one of coils, discrete, holding and input
 read @LINE 1 --type flaot|--type "flaot" is not one of bit, uint16,
-read @LINE 1 --order abcd|--order "abcd" is not one of ABCD, CDAB, BADC and DCBA
+read @LINE 1 --order abcd|--order "abcd" is not one of ABCD, CDAB, BADC, DCBA, EFGHABCD,
 read @LINE 1 --table coils --type uint16|the table coils has no values of type uint16
 read @LINE 1 --type bit|the table holding has no values of type bit
 read @LINE 1 --scale 0|--scale "0" is not a decimal number other than 0
@@ -316,7 +316,7 @@ def completed(mbm):
 
 @pytest.mark.parametrize("line, wanted", [
     ("mbm wr", ["write"]), ("mbm help sc", ["scan"]), ("mbm read --ta", ["--table"]),
-    ("mbm read tcp://h --table ", ["coils", "discrete", "holding", "input"]), ("mbm read -o D", ["DCBA"]),
+    ("mbm read tcp://h --table ", ["coils", "discrete", "holding", "input"]), ("mbm read -o D", ["DCBA", "DCBAHGFE"]),
     ("mbm read tcp", ["tcp://"]), ("mbm header tcp", []), ("mbm import tel", ["telegraf"]), ("mbm header --mark", ["--markdown"])])
 def test_bash_completes_commands_options_words_and_lines(completed, line, wanted):
     assert completed(line) == wanted

@@ -1,0 +1,316 @@
+"""Values of the types that devices have beside integers and floats: written and read, byte by byte, and through `mbm serve`,
+a server of libmodbus, one of pymodbus and a bridge."""
+
+import datetime
+import json
+import struct
+
+import peers
+import pytest
+from peers import DAMAGED, DONE, PATIENT, WRONG, TcpDevice, served, wait
+from services import Broker, Subscriber
+
+
+def seconds(text):
+    """Seconds since 1970, as Python has them."""
+    return int(datetime.datetime.fromisoformat(text.replace("Z", "+00:00")).timestamp())
+
+
+EVENING, SINCE_2000 = "2026-11-27T20:15:30Z", seconds("2000-01-01T00:00:00Z")
+# The options of `mbm read` and `mbm write`, a value, and the registers that it is.
+TYPES = [
+    (["int24"], "-123456", "fffe1dc0"), (["uint24"], "16777215", "00ffffff"),
+    (["int48"], "-2", "fffffffffffe"), (["uint48", "-o", "CDAB"], "123456789012", "1a14be99001c"),
+    (["sign_magnitude16"], "-1000", "83e8"), (["sign_magnitude32"], "-1000", "800003e8"), (["sign_magnitude16"], "32767", "7fff"),
+    (["bcd16"], "2301", "2301"), (["bcd32"], "12345678", "12345678"), (["bcd32", "-o", "CDAB"], "12345678", "56781234"),
+    (["bcd16", "--scale", "0.1"], "230.1", "2301"),
+    (["uint32_m10k"], "99999999", "270f270f"), (["int32_m10k"], "-12345678", "fb2ee9d2"),
+    (["uint48_m10k", "-o", "CDAB"], "100020003", "000300020001"), (["int48_m10k"], "-1", "00000000ffff"),
+    # The energy of a PM710, lowest register first.
+    (["uint64_m10k", "-o", "CDAB"], "4363560264", "010818d4002b0000"), (["int64_m10k"], "-9999999999999999", "d8f1d8f1d8f1d8f1"),
+    (["float16"], "21.5", struct.pack(">e", 21.5).hex()), (["float16"], "-0.1", struct.pack(">e", -0.1).hex()), (["float16"], "65504", "7bff"),
+    (["uint64", "-o", "EFGHABCD"], "72623859790382856", "0506070801020304"), (["int64", "-o", "CDABGHEF"], "72623859790382856", "0304010207080506"),
+    (["uint64", "-o", "FEHGBADC"], "72623859790382856", "0605080702010403"), (["uint64", "-o", "DCBAHGFE"], "72623859790382856", "0403020108070605"),
+    (["double", "-o", "EFGHABCD"], "0.1", (struct.pack(">d", 0.1)[4:] + struct.pack(">d", 0.1)[:4]).hex()),
+    (["text_low"], "Ab1", "004100620031"), (["text_high"], "Ab1", "410062003100"), (["text_spaces"], "Ab1", "41623120"),
+    (["text_spaces", "-o", "BADC"], "Ab1", "62412031"), (["text_low_spaces"], "Ab", "00410062"), (["text_high_spaces"], "Ab", "41006200"),
+    (["unix32"], EVENING, f"{seconds(EVENING):08x}"), (["unix32", "-o", "CDAB"], "2106-02-07T06:28:15Z", "ffffffff"),
+    (["unix32", "--time-zone", "+01:00"], "2026-11-27T20:15:30+01:00", f"{seconds(EVENING):08x}"),
+    (["unix64"], "1969-12-31T23:59:59Z", "ffffffffffffffff"), (["unix64_ms"], "2026-11-27T20:15:30.123Z", f"{seconds(EVENING) * 1000 + 123:016x}"),
+    (["unix64_ms"], "1969-12-31T23:59:59.999Z", "ffffffffffffffff"),
+    (["seconds_2000"], EVENING, f"{seconds(EVENING) - SINCE_2000:08x}"),
+    (["iec870"], "2026-11-27T23:59:58.123Z", "001a0b1b173be30b"), (["iec870", "-o", "CDAB"], "2026-11-27T23:59:58.123Z", "e30b173b0b1b001a"),
+    (["iec870_3"], "2026-11-27T23:59:00Z", "001a0b1b173b"),
+    (["date", "--layout", "Y M D h m s"], EVENING, "07ea000b001b0014000f001e"), (["date", "--layout", "yM Dh ms"], EVENING, "1a0b1b140f1e"),
+    (["date", "--layout", "MD nh ms f"], "2026-11-27T20:15:30.250Z", "0b1b7e140f1e00fa"), (["date", "--layout", "Y M D"], "2024-02-29", "07e80002001d"),
+    (["date", "--layout", "hm"], "07:30:00", "071e"), (["date_bcd", "--layout", "sm h- DM yC"], EVENING, "3015200027112620"),
+]
+NAMES = [" ".join([*one[0], one[1]]) for one in TYPES]
+
+
+def read_words(options, address, text):
+    """The words of `mbm read`: of a text with its number of characters."""
+    return ("-T", *options, address, *([len(text)] if options[0].startswith("text") else []))
+
+
+def is_text(text):
+    """Whether JSON has a value as a text: all but numbers."""
+    return not text.lstrip("-").replace(".", "", 1).isdigit()
+
+
+@pytest.mark.parametrize("options, value, registers", TYPES, ids=NAMES)
+def test_a_value_is_these_registers_and_back(mbm, options, value, registers):
+    device = TcpDevice(lambda pdu: pdu[:5])
+    mbm.prints("", "write", device.line, "-q", "--multiple", "-T", *options, 100, value)
+    count = len(registers) // 4
+    assert device.asked == [(1, f"100064{count:04x}{2 * count:02x}{registers}")]
+    data = bytes.fromhex(registers)
+    line = TcpDevice(lambda pdu: bytes([pdu[0], len(data)]) + data).line
+    mbm.prints(f"  100  {value}\n", "read", line, *read_words(options, 100, value))
+    found = mbm.json("read", line, *read_words(options, 100, value))["values"]
+    assert found == [{"address": 100, "value": value if is_text(value) else json.loads(value)}]
+
+
+@pytest.mark.parametrize("options, registers", [
+    (["bcd16"], "12a4"), (["bcd32"], "0000000f"), (["uint32_m10k"], "27100000"), (["uint32_m10k"], "ffff0000"), (["int32_m10k"], "80000000"),
+    (["iec870"], "0000000000000000"), (["iec870"], "ffffffffffffffff"), (["unix64"], "7fffffffffffffff"),
+    (["date", "--layout", "Y M D h m s"], "07ea0002001d000000000000"), (["date", "--layout", "yM Dh ms"], "ffffffffffff"),
+    (["date_bcd", "--layout", "Y M D"], "20ab00010001")])
+def test_registers_that_hold_no_value_of_the_type_are_null_with_a_status(mbm, options, registers):
+    data = bytes.fromhex(registers)
+    line = TcpDevice(lambda pdu: bytes([pdu[0], len(data)]) + data).line
+    why = "the registers hold no value of this type"
+    assert mbm("read", line, "-T", *options, 7, *PATIENT) == (DAMAGED, f"    7  {why}\n", "")
+    assert mbm.json("read", line, "-T", *options, 7, code=DAMAGED)["values"] == [{"address": 7, "value": None, "status": why}]
+
+
+@pytest.mark.parametrize("words, sentence", [
+    ("-T bcd16 1 10000", "VALUE \"10000\" is out of range of the type bcd16."),
+    ("-T uint32_m10k 1 100000000", "is out of range of the type uint32_m10k."), ("-T uint32_m10k 1 -1", "is out of range of the type uint32_m10k."),
+    ("-T int24 1 8388608", "is out of range of the type int24."), ("-T sign_magnitude16 1 -32768", "is out of range of the type sign_magnitude16."),
+    ("-T float16 1 65520", "is out of range of the type float16."), ("-T float16 1 2049", "is a whole number that the type cannot hold exactly."),
+    ("-T float 1 16777217", "is a whole number that the type cannot hold exactly."),
+    ("-T double 1 9007199254740993", "VALUE \"9007199254740993\" is a whole number that the type cannot hold exactly."),
+    ("-T unix32 1 2026-02-29T00:00:00Z", "VALUE \"2026-02-29T00:00:00Z\" is a date that does not exist."),
+    ("-T unix32 1 2026-02-28T00:00:00", "has no time zone: Z, or such as +01:00."), ("-T unix32 1 tomorrow", "is not a date and a time such as 2026-"),
+    ("-T unix32 1 1969-12-31T23:59:59Z", "is out of range of the type unix32."), ("-T unix32 1 2106-02-07T06:28:16Z", "is out of range of the type unix32."),
+    ("-T unix32 1 2026-02-28T00:00:00.5Z", "has milliseconds, for which the registers have no place."),
+    ("-T unix64_ms 1 2026-02-28T00:00:00.0005Z", "is not a date and a time such as"),
+    ("-T iec870_3 1 2026-02-28T00:00:01Z", "has seconds, for which the registers have no place."), ("-T iec870 1 2128-01-01T00:00:00Z", "is out of range of the type iec870."),
+    ("-T date --layout hm 1 24:00", "is no time of a day."), ("-T date --layout hm 1 7:30", "is not a time such as 20:15:00."),
+    ("-T date --layout yMDhms 1 07:30", "--layout \"yMDhms\" is no layout of a date, such as"), ("-T date 1 07:30", "the type date needs --layout, such as \"Y M D h m s\"."),
+    ("-T date --layout -.-.-.-.-.-.-.-.hm 1 07:30", "has 9 registers: a date has at most 8."),
+    ("-T uint16 --layout hm 1 5", "--layout is for the types date and date_bcd, not for uint16."), ("-T uint16 --time-zone +01:00 1 5", "--time-zone is for dates."),
+    ("-T unix32 --time-zone CET 1 5", "--time-zone \"CET\" is neither Z nor an offset such as +01:00."),
+    ("-T unix32 --scale 2 1 5", "--scale needs a number, not a bit, a text, a date or --hex."), ("-T bcd16 --hex 1 5", "--hex needs an integer type."),
+    ("-T uint32 -o EFGHABCD 1 5", "--order EFGHABCD is for values of four registers."), ("-T int48_m10k -o EFGHABCD 1 5", "--order EFGHABCD is for values of four registers."),
+])
+def test_what_cannot_be_written_exactly_is_refused_with_a_sentence(mbm, words, sentence):
+    device = TcpDevice()
+    mbm.fails(WRONG, sentence, "write", device.line, *(word.replace(".", " ") if word.endswith("hm") else word for word in words.split()))
+    assert device.asked == []
+
+
+def test_a_float_with_a_point_or_an_exponent_is_rounded(mbm):
+    for kind, value in (("float", "16777217.0"), ("double", "9007199254740993e0"), ("float16", "2049.0"), ("float", "0.1")):
+        device = TcpDevice(lambda pdu: pdu[:5])
+        mbm.prints("", "write", device.line, "-q", "-T", kind, 1, value)
+        assert len(device.asked) == 1
+
+
+def test_several_values_of_a_type_follow_each_other(mbm):
+    data = bytes.fromhex("0001000203e7" + "0000000000ff")
+    line = TcpDevice(lambda pdu: bytes([pdu[0], len(data)]) + data).line
+    mbm.prints(f"    0  {0x1000203E7}\n    3  255\n", "read", line, "-T", "uint48", 0, 2)
+    device = TcpDevice(lambda pdu: pdu[:5])
+    mbm.prints("", "write", device.line, "-q", "-T", "date", "--layout", "hm", 0, "07:30", "22:00")
+    assert device.asked == [(1, "1000000002" "04" "071e1600")]
+
+
+# --- in a device file
+
+
+def fields_of(types):
+    """A device file with a field for each type, at the holding registers from 0 on, eight apart."""
+    lines = []
+    for at, (options, value, _) in enumerate(types):
+        more = dict(zip((one.lstrip("-").replace("time-zone", "time_zone") for one in options[1::2]), options[2::2]))
+        order = more.pop("o", None)
+        keys = {"name": f"f{at}", "table": "holding", "address": 8 * at, "type": options[0], "access": "read-write", **more}
+        if order:
+            keys["order"] = order
+        if options[0].startswith("text"):
+            keys["count"] = len(value)
+        lines.append("  - " + json.dumps(keys | {"value": value if is_text(value) else json.loads(value)}))
+    return "device: types\nunit: 17\nfields:\n" + "\n".join(lines) + "\n"
+
+
+def registers_of(types):
+    """The registers of such a device."""
+    held = [0] * (8 * len(types))
+    for at, (_, _, text) in enumerate(types):
+        for i in range(len(text) // 4):
+            held[8 * at + i] = int(text[4 * i:4 * i + 4], 16)
+    return held
+
+
+def poll(mbm, line, file):
+    """The values of one round, and the statuses."""
+    found = mbm("poll", line, file, "--once", "--json", "-q", *PATIENT)
+    assert found.code == DONE, found
+    rows = [json.loads(row) for row in found.out.splitlines()]
+    return {row["name"]: row["value"] for row in rows}, {row["status"] for row in rows}
+
+
+def expected(types):
+    return {f"f{at}": value if is_text(value) else json.loads(value) for at, (_, value, _) in enumerate(types)}
+
+
+def test_mbm_serve_has_the_values_of_the_file_and_takes_others(mbm, write):
+    file = write("types.yaml", fields_of(TYPES))
+    line = mbm.serve("tcp://127.0.0.1:0", file)
+    assert poll(mbm, line, file) == (expected(TYPES), {"success"})
+    # What another program reads are these registers.
+    found = mbm.json("read", line, "-u", 17, 8 * 8, 2, "--hex")["values"]
+    assert [one["value"] for one in found] == ["0x1234", "0x5678"]
+
+
+def test_values_go_through_a_server_of_libmodbus(plain, libmodbus, write):
+    types = TYPES[:50]
+    file = write("types.yaml", fields_of(types))
+    for at, (options, value, _) in enumerate(types):
+        plain.prints("", "write", libmodbus.tcp, "-u", 17, "-q", "--multiple", "-T", *options, 8 * at, value)
+    assert poll(plain, libmodbus.tcp, file) == (expected(types), {"success"})
+
+
+def test_values_go_through_a_server_of_pymodbus(plain, write):
+    from pymodbus.server import ModbusTcpServer
+    from pymodbus.simulator import DataType, SimData, SimDevice
+
+    device = SimDevice(17, simdata=[SimData(0, values=registers_of(TYPES), datatype=DataType.REGISTERS)])
+    line = f"tcp://127.0.0.1:{served(lambda: ModbusTcpServer(device, address=('127.0.0.1', 0)))}"
+    file = write("types.yaml", fields_of(TYPES))
+    assert poll(plain, line, file) == (expected(TYPES), {"success"})
+    for options, value, address in ((["bcd32"], "87654321", 64), (["date", "--layout", "Y M D h m s"], "2000-02-29T12:00:00Z", 8 * 43)):
+        plain.prints("", "write", line, "-u", 17, "-q", "--multiple", "-T", *options, address, value)
+        plain.prints(f"{address:5}  {value}\n", "read", line, "-u", 17, "-T", *options, address)
+
+
+def test_pymodbus_reads_a_number_as_it_was_written_in_each_order(plain):
+    """pymodbus's client converts registers itself: its numbers are those of mbm."""
+    from pymodbus.client import ModbusTcpClient
+
+    for options, value, kind, order in ((["uint64"], 72623859790382856, "UINT64", "big"), (["int64", "-o", "CDAB"], -2, "INT64", "little"),
+                                        (["double"], 0.1, "FLOAT64", "big"), (["uint32"], 7, "UINT32", "big")):
+        device = TcpDevice(lambda pdu: pdu[:5])
+        plain.prints("", "write", device.line, "-q", "-T", *options, 0, repr(value))
+        data = device.asked[0][1][12:]
+        registers = [int(data[i:i + 4], 16) for i in range(0, len(data), 4)]
+        assert ModbusTcpClient.convert_from_registers(registers, ModbusTcpClient.DATATYPE[kind], word_order=order) == value
+
+
+def test_a_field_without_a_value_of_its_type_has_a_status_in_poll(mbm, write):
+    file = write("clock.yaml", "fields: [{name: clock, table: holding, address: 0, type: iec870}, {name: other, table: holding, address: 0, type: uint16}]")
+    empty = TcpDevice(lambda pdu: bytes([pdu[0], pdu[4] * 2]) + bytes(pdu[4] * 2))
+    assert poll(mbm, empty.line, file) == ({"clock": None, "other": 0}, {"success", "the registers hold no value of this type"})
+
+
+HEADER = """\
+#include "mbm.h"
+#define TYPES_PLAN
+#define TYPES_SERVER
+#include "types.h"
+#include <stdio.h>
+int main(void)
+{
+    mbm_registers view;
+    uint64_t energy = 0, bits = 0;
+    uint32_t digits = 0;
+    mbm_date date = MBM_INIT;
+    char serial[TYPES_SERIAL_COUNT + 1] = "";
+
+    types_initialise();
+    types_get_energy(&energy);
+    types_get_mode(&bits);
+    types_get_clock(1, &date);
+    types_get_serial(serial, sizeof serial);
+    (void)mbm_registers_ofWords(&view, types_holding, 8, 0);
+    printf("%u %llu %llu %02u:%02u %s", types_take_bcd(&view, &digits), (unsigned long long)energy, (unsigned long long)bits, date.hour,
+           date.minute, serial);
+    printf(" %lu %u\\n", (unsigned long)digits, types_set_bcd(10000));
+    return TYPES_MODE_BIT != 12 || TYPES_MODE_BITS != 8 || TYPES_FIELDS != 5;
+}
+"""
+
+
+def test_a_header_has_functions_that_take_these_values_out_of_registers(mbm, folder, write):
+    file = write("types.yaml", """\
+device: types
+fields:
+  - {name: bcd, table: holding, address: 0, type: bcd16, value: 1234, access: read-write}
+  - {name: energy, table: holding, address: 1, type: uint64_m10k, order: CDAB, value: 4363560264}
+  - {name: mode, table: holding, address: 5, type: uint32, bits: 12-19, value: 165}
+  - {name: clock, table: holding, address: 7, type: date, layout: hm, count: 2, value: ["07:30", "22:15"]}
+  - {name: serial, table: holding, address: 9, type: text_low, count: 4, value: AB1}
+""")
+    write("program.c", HEADER)
+    assert mbm("header", file, "-o", f"{folder}/types.h") == (DONE, "", "")
+    warnings = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror".split()
+    for compiler in ("gcc", "g++ -x c++ -std=c++11", "avr-gcc -mmcu=atmega328p", "arm-none-eabi-gcc -mthumb -mcpu=cortex-m0plus"):
+        done = peers.run(*compiler.split(), *warnings, f"-I{peers.ROOT}/include", "-c", f"{folder}/program.c", "-o", f"{folder}/program.o")
+        assert done.code == 0, done.error
+    parts = f"{peers.BUILD}/{mbm.build}"
+    sanitizers = ["clang", "-fsanitize=address,undefined"] if mbm.build == "sanitized" else ["gcc"]
+    archive = f"{parts}/libmbm.a" if mbm.build == "sanitized" else f"{peers.ROOT}/target/release/libmbm.a"
+    done = peers.run(*sanitizers, "-std=c11", f"-I{peers.ROOT}/include", f"{folder}/program.c", archive, "-o", f"{folder}/program")
+    assert done.code == 0, done.error
+    assert peers.run(f"{folder}/program") == (DONE, "0 4363560264 165 22:15 AB1 1234 246\n", "")
+
+
+def test_the_bridge_publishes_and_writes_them(plain, folder, libmodbus, write):
+    file = write("types.yaml", """\
+unit: 17
+interval: 200ms
+time_zone: +01:00
+fields:
+  - {name: bcd, table: holding, address: 200, type: bcd32, access: read-write}
+  - {name: energy, table: holding, address: 210, type: uint64_m10k, order: CDAB, scale: 0.001, access: read-write}
+  - {name: clock, table: holding, address: 220, type: date, layout: yM Dh ms, access: read-write}
+  - {name: starts, table: holding, address: 230, type: date, layout: hm, count: 2, access: read-write}
+  - {name: serial, table: holding, address: 240, type: text_low_spaces, count: 6, access: read-write}
+  - {name: mode, table: holding, address: 250, type: uint32, bits: 12-19}
+""")
+    for address, registers in ((200, "1 2"), (210, "1 2 3 4"), (220, "6667 6932 3870"), (230, "1 2"), (240, "32 32 32 32 32 32"), (250, "10 20480")):
+        plain.prints("", "write", libmodbus.tcp, "-u", 17, "-q", "--multiple", address, *registers.split())
+    broker = Broker(folder).come()
+    subscriber = Subscriber(broker)
+    plain.begin("bridge", "-b", broker.place, "-t", "hall", "--discovery", "homeassistant", libmodbus.tcp, file)
+    for field, value in (("bcd", 10002), ("energy", 4000300020.001), ("clock", "2026-11-27T20:15:30+01:00"), ("starts", ["00:01:00", "00:02:00"]),
+                         ("serial", ""), ("mode", 165)):
+        subscriber.expect_value(f"hall/{field}", value)
+    for field, payload, value in (
+            ("bcd", "12345678", 12345678), ("bcd", '{"value": 7}', 7), ("energy", "1.5", 1.5), ("clock", "2027-01-01T00:00:00Z", "2027-01-01T01:00:00+01:00"),
+            ("clock", '"2027-01-01T00:00:00+01:00"', "2027-01-01T00:00:00+01:00"), ("clock", '{"value": "2027-01-02T00:00:00+01:00"}', "2027-01-02T00:00:00+01:00"),
+            ("starts", '["07:30", "22:00"]', ["07:30:00", "22:00:00"]), ("serial", "AB 12", "AB 12")):
+        subscriber.expect_result(f"hall/{field}", payload, "success")
+        subscriber.expect_value(f"hall/{field}", value)
+    for field, payload, why in (
+            ("bcd", "100000000", "the number is out of range"), ("energy", "1.0005", "the number is not a multiple of the scale"),
+            ("clock", "2027-02-29T00:00:00Z", "the date is a date that does not exist"), ("clock", "5", "the date is not a date and a time such as .*"),
+            ("serial", "ends ", "the text ends with a space, which .*"), ("mode", "5", "the field is not writable")):
+        subscriber.expect_result(f"hall/{field}", payload, why)
+    subscriber.expect_value("hall/clock", "2027-01-02T00:00:00+01:00")
+    assert wait(lambda: any("/clock/config" in topic for topic in subscriber.last))
+    clock = next(json.loads(text) for topic, text in subscriber.last.items() if topic.endswith("/clock/config"))
+    assert "min" not in clock and "unit_of_measurement" not in clock
+
+
+def test_a_library_of_others_packs_the_same_halves(plain):
+    """Python's struct has half floats too: every exponent, and a mantissa each."""
+    for bits in range(0x0001, 0x7C00, 0x123):
+        value = struct.unpack(">e", bits.to_bytes(2, "big"))[0]
+        data = bits.to_bytes(2, "big")
+        line = TcpDevice(lambda pdu: bytes([pdu[0], 2]) + data).line
+        text = plain("read", line, "-T", "float16", 0, *PATIENT).out.split()[1]
+        assert struct.pack(">e", float(text)) == data, (text, value)
+    assert peers.DONE == DONE
