@@ -34,7 +34,7 @@ PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*
 # The command line tool.
 TOOL := $(wildcard cli/*.c)
 # What reads a device file, for its tests.
-DEVICE_FILES := $(filter-out cli/device_plan.c,$(wildcard cli/device*.c))
+DEVICE_FILES := $(filter-out cli/device_plan.c,$(wildcard cli/device*.c)) cli/reach.c
 # The tool uses what glibc and musl have beside POSIX, such as argp.
 TOOL_FLAGS := -D_GNU_SOURCE
 TOOL_PORTS := $(wildcard ports/linux/mbm_*.c)

@@ -3,6 +3,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "bridge_file.h"
+#include "device_plan.h"
 #include "discovery.h"
 #include "options.h"
 #include "report.h"
@@ -37,6 +38,7 @@ typedef struct bridge {
 typedef struct next_line {
     bridge_line *line;
     bridge_table *table;
+    place where;
     int is_new;
 } next_line;
 
@@ -54,18 +56,29 @@ static bridge_line *find_line(bridge *b, const char *text, const char *topic)
 static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_line *next,
                    char wrong[YAML_FILE_WRONG_BYTES])
 {
-    const char *file = from->lines[index].path;
+    const char *file = from->lines[index].path, *why;
     int code;
 
     next->table =
         bridge_table_read(file, bridge_setup_gap(from), bridge_setup_function(from), &code, wrong);
     if (!next->table)
         return code;
+    next->where = from->lines[index].place;
+    why = device_plan_check(&next->table->fields, file, next->where.framing);
+    if (why) {
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s", why);
+        return CODE_WRONG;
+    }
+    why = line_add_reach(&next->where, &next->table->fields.reach, options.in_flight);
+    if (why) {
+        snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: %s", file, why);
+        return CODE_WRONG;
+    }
     next->line = find_line(b, from->lines[index].text, from->lines[index].topic);
     next->is_new = !next->line;
     if (next->is_new)
         next->line = bridge_line_make(&b->settings, from->lines[index].text, file,
-                                      from->lines[index].topic, &from->lines[index].place);
+                                      from->lines[index].topic, &next->where);
     if (!next->line) {
         snprintf(wrong, YAML_FILE_WRONG_BYTES, REPORT_NO_MEMORY);
         return CODE_SYSTEM;
@@ -135,6 +148,8 @@ static void apply(bridge *b, next_line next[BRIDGE_LINES], unsigned count)
             bridge_line_end(one);
             continue;
         }
+        if (!next[i].is_new)
+            bridge_line_reach(one, &next[i].where.reach);
         if (next[i].is_new) {
             bridge_line_connected(one);
             added++;

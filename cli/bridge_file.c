@@ -18,8 +18,8 @@ const char *const bridge_names[] = {
     "plain",  "all",   "gap",        "write_function", "lines",
     NULL};
 
-enum { LINE, THE_FILE, LINE_TOPIC, LINE_KEYS };
-static const char *const LINE_NAMES[] = {"line", "file", "topic", NULL};
+enum { LINE, THE_FILE, LINE_TOPIC, LINE_REACH, LINE_KEYS = LINE_REACH + REACH_FILE_KEYS };
+static const char *const LINE_NAMES[] = {"line", "file", "topic", REACH_FILE_NAMES, NULL};
 static const char *const ANSWERS[] = {"no", "yes", NULL};
 static const char *const DISCOVERIES[] = {"homeassistant", NULL};
 
@@ -258,6 +258,21 @@ static void join_path(const char *of, const char *path, char full[2 * LONGEST_VA
                  path);
 }
 
+/* Reads what the device needs. The name of the line counts first. */
+static int read_reach(yaml_file *file, const yaml_node_t *node, const yaml_node_t *const *values,
+                      place *into)
+{
+    const reach_line has = place_reach(into, 1);
+    reach own = {0};
+    const char *wrong;
+
+    if (!reach_read_nodes(file, values, &own))
+        return 0;
+    reach_fill(&into->reach, &own);
+    wrong = reach_check(&into->reach, &has, "");
+    return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
+}
+
 static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *into)
 {
     const yaml_node_t *values[LINE_KEYS] = {NULL};
@@ -277,7 +292,9 @@ static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *int
     }
     join_path(file->path, path, full);
     wrong = bridge_setup_line(into, text, full, topic);
-    return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
+    if (wrong)
+        return yaml_file_refuse(file, node, "%s", wrong);
+    return read_reach(file, node, values + LINE_REACH, &into->lines[into->line_count - 1].place);
 }
 
 static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
@@ -327,9 +344,11 @@ int bridge_setup_copy(bridge_setup *to, const bridge_setup *from)
     for (i = 0; i < BRIDGE_SETTINGS; i++)
         if (from->values[i] && bridge_setup_value(to, i, from->values[i]))
             return 0;
-    for (i = 0; i < from->line_count; i++)
+    for (i = 0; i < from->line_count; i++) {
         if (bridge_setup_line(to, from->lines[i].text, from->lines[i].path, from->lines[i].topic))
             return 0;
+        to->lines[i].place.reach = from->lines[i].place.reach;
+    }
     return 1;
 }
 

@@ -326,7 +326,7 @@ void bridge_line_connected(bridge_line *l)
     broker_subscribe(&l->bridge->mqtt, l->below);
     if (l->bridge->has_discovery)
         discover(l);
-    for (number = 1; number < 256; number++)
+    for (number = 0; number < 256; number++)
         if (l->table->units[number].state != UNIT_UNKNOWN)
             publish_unit(l, number, unit_text(&l->table->units[number]));
     for (field = 0; field < l->table->fields.readable; field++)
@@ -369,7 +369,7 @@ static void remove_retained(bridge_line *l, const bridge_table *next)
         if (!is_discovered(l, others, name, topic))
             broker_publish_at(&l->bridge->mqtt, topic, "");
     }
-    for (number = 1; number < 256; number++)
+    for (number = 0; number < 256; number++)
         if (l->table->units[number].fields > 0 && (!next || next->units[number].fields == 0))
             publish_unit(l, number, "");
 }
@@ -583,6 +583,12 @@ unsigned bridge_line_not_available(const bridge_line *l)
         count += l->table->last[field].status == MBM_NOT_AVAILABLE ||
                  l->table->last[field].status == MBM_MALFORMED_VALUE;
     return count;
+}
+
+void bridge_line_reach(bridge_line *l, const reach *what)
+{
+    l->where.reach = *what;
+    line_reach(&l->at, what);
 }
 
 void bridge_line_clear(bridge_line *l)

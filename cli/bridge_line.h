@@ -91,6 +91,9 @@ int bridge_line_begin(bridge_line *l, bridge_table *table, int is_patient);
  * have. */
 void bridge_line_replace(bridge_line *l, bridge_table *next);
 
+/* Sets what the device needs from now on. */
+void bridge_line_reach(bridge_line *l, const reach *what);
+
 /* Removes all retained messages of the line, which is gone from the bridge. */
 void bridge_line_clear(bridge_line *l);
 

@@ -5,6 +5,7 @@
 #define DEVICE_H
 
 #include "conversion.h"
+#include "reach.h"
 #include "value.h"
 
 /* What a field allows. */
@@ -74,6 +75,7 @@ typedef struct device {
     mbm_planField *planned; /* the same fields for mbm_plan_begin */
     device_limits limits;
     uint8_t notation; /* DEVICE_ON_WIRE, DEVICE_ONE_BASED or DEVICE_MODICON */
+    reach reach;      /* what the device needs */
 } device;
 
 /* Frees all that a device has. */

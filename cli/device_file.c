@@ -35,12 +35,14 @@ enum {
     DEVICE_TIME_ZONE,
     LIMITS,
     DEVICE_NOT_AVAILABLE = LIMITS + LIMITS_KEYS,
-    DEVICE_KEYS
+    REACH,
+    DEVICE_KEYS = REACH + REACH_FILE_KEYS
 };
 static const char *const DEVICE_NAMES[] = {
-    "device",   "unit",      "interval",       "order",     "mask_write",        "fields",
-    "notation", "one_based", "write_function", "time_zone", DEVICE_LIMITS_NAMES, "not_available",
-    NULL};
+    "device",         "unit",      "interval",          "order",
+    "mask_write",     "fields",    "notation",          "one_based",
+    "write_function", "time_zone", DEVICE_LIMITS_NAMES, "not_available",
+    REACH_FILE_NAMES, NULL};
 enum {
     NAME,
     TABLE,
@@ -206,7 +208,7 @@ static int read_shared(yaml_file *file, const yaml_node_t *unit, const yaml_node
 {
     uint32_t number = planned->unit;
 
-    if (!yaml_file_number(file, "unit", unit, 1, 255, &number) ||
+    if (!yaml_file_number(file, "unit", unit, 0, 255, &number) ||
         !yaml_file_time(file, "interval", interval, 1, MBM_PLAN_LONGEST_INTERVAL,
                         &planned->intervalMs) ||
         !read_word(file, "order", order, value_order_names, &planned->order))
@@ -517,7 +519,8 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
         !device_address_read_notation(file, values[NOTATION], values[ONE_BASED], into) ||
         !device_limits_read_function(file, values[DEVICE_WRITE_FUNCTION], &shared.write_function) ||
         !device_types_read_zone(file, values[DEVICE_TIME_ZONE], &shared.zone) ||
-        !device_limits_read(file, values + LIMITS, into))
+        !device_limits_read(file, values + LIMITS, into) ||
+        !reach_read_nodes(file, values + REACH, &into->reach))
         return 0;
     into->writes_masks = (uint8_t)writes_masks;
     shared.not_available = values[DEVICE_NOT_AVAILABLE];

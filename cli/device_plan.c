@@ -61,6 +61,19 @@ void device_plan_free(mbm_planSetup *setup)
     free(setup->requests);
 }
 
+const char *device_plan_check(const device *of, const char *path, uint8_t framing)
+{
+    uint16_t i;
+
+    for (i = 0; i < of->readable && framing != MBM_FRAMING_TCP; i++)
+        if (of->planned[i].unit == 0)
+            return say(
+                "%s:%d: unit 0 of %s is read in frames of Modbus TCP only: on a serial line it "
+                "is a broadcast, which no device answers",
+                path, of->fields[i].line, of->fields[i].name);
+    return NULL;
+}
+
 const char *device_plan_wrong(const device *of, const char *path, uint8_t status, uint16_t wrong)
 {
     const char *text = status == MBM_BUFFER_TOO_SMALL
@@ -101,9 +114,9 @@ uint8_t device_plan_try(mbm_plan *plan, const mbm_planSetup *setup, uint16_t *wr
     static const mbm_port nowhere = {
         .read = read_nothing, .write = write_nothing, .micros = no_time};
     static mbm_client client = MBM_INIT;
-    static uint8_t frame[MBM_MAX_FRAME];
+    static uint8_t frame[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
 
-    (void)mbm_client_beginRtuOverTcp(&client, &nowhere, frame, sizeof frame);
+    (void)mbm_client_beginTcp(&client, &nowhere, frame, sizeof frame, outgoing, sizeof outgoing);
     return mbm_plan_begin(plan, &client, setup, wrong);
 }
 

@@ -21,6 +21,10 @@ int device_plan_split(mbm_planSplitting *splitting, const mbm_planSetup *setup);
 /* Whether the device does not have a field, or refuses it, by the status of the field. */
 int device_plan_is_refused(uint8_t status);
 
+/* Returns NULL, or why a line with these frames, one of MBM_FRAMING_, cannot read the device: a
+ * sentence without its full stop, as device_plan_wrong. */
+const char *device_plan_check(const device *of, const char *path, uint8_t framing);
+
 /* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns
  * the status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may
  * begin then. */

@@ -82,7 +82,8 @@ static void set_line(gateway *g, unsigned index)
     const unsigned slot = g->place_of[index];
     const int is_tcp = g->lines[slot].at.place.framing == MBM_FRAMING_TCP;
 
-    gateway_line_set(&g->lines[slot], &g->setup.lines[index].pace);
+    gateway_line_set(&g->lines[slot], &g->setup.lines[index].pace,
+                     &g->setup.lines[index].place.reach);
     g->gateway_lines[slot].inFlight = (uint8_t)(is_tcp ? g->setup.lines[index].pace.in_flight : 1);
 }
 
@@ -523,7 +524,7 @@ static const struct argp_option texts[] = {
     {0}};
 
 static const struct argp_child children[] = {
-    {.argp = &options_service}, {.argp = &options_trace}, {0}};
+    {.argp = &options_service}, {.argp = &options_reach}, {.argp = &options_trace}, {0}};
 static const struct argp parser = {
     .options = texts,
     .parser = parse,
@@ -546,6 +547,7 @@ int gateway_command(int argc, char **argv)
 {
     static gateway data;
     gateway *g = &data;
+    const char *wrong;
     unsigned i;
     int code = CODE_DONE;
 
@@ -560,8 +562,14 @@ int gateway_command(int argc, char **argv)
                                     .connections = g->connections,
                                     .requests = g->requests};
     argp_parse(&parser, argc, argv, 0, NULL, g);
-    for (i = 0; i < g->given.line_count; i++)
+    for (i = 0; i < g->given.line_count; i++) {
         g->given.lines[i].pace = g->given.pace;
+        wrong = gateway_setup_reach(&g->given, i, &options.reach, "--");
+        if (wrong)
+            return report(CODE_WRONG, "%s: %s", g->given.lines[i].text, wrong);
+    }
+    /* The file may say something else. */
+    g->given.reach = options.reach;
     g->setup = g->given;
     if (g->path)
         code = gateway_file_read(&g->setup, g->path);

@@ -23,14 +23,24 @@ enum {
     IN_FLIGHT,
     REPLACE_AFTER,
     THE_LINES,
-    GATEWAY_KEYS
+    GATEWAY_REACH,
+    GATEWAY_KEYS = GATEWAY_REACH + REACH_FILE_KEYS
 };
 static const char *const GATEWAY_NAMES[] = {
-    "listen",     "connections", "requests",      "idle",  "queue_time", "timeout",
-    "quiet_time", "in_flight",   "replace_after", "lines", NULL};
-enum { LINE, UNITS, LINE_TIMEOUT, LINE_QUIET_TIME, LINE_IN_FLIGHT, LINE_REPLACE_AFTER, LINE_KEYS };
-static const char *const LINE_NAMES[] = {"line",      "units",         "timeout", "quiet_time",
-                                         "in_flight", "replace_after", NULL};
+    "listen",     "connections", "requests",      "idle",  "queue_time",     "timeout",
+    "quiet_time", "in_flight",   "replace_after", "lines", REACH_FILE_NAMES, NULL};
+enum {
+    LINE,
+    UNITS,
+    LINE_TIMEOUT,
+    LINE_QUIET_TIME,
+    LINE_IN_FLIGHT,
+    LINE_REPLACE_AFTER,
+    LINE_REACH,
+    LINE_KEYS = LINE_REACH + REACH_FILE_KEYS
+};
+static const char *const LINE_NAMES[] = {
+    "line", "units", "timeout", "quiet_time", "in_flight", "replace_after", REACH_FILE_NAMES, NULL};
 
 /* --- the map of units --- */
 
@@ -110,6 +120,18 @@ const char *gateway_setup_line(gateway_setup *to, const char *text)
     return wrong;
 }
 
+const char *gateway_setup_reach(gateway_setup *to, unsigned index, const reach *more,
+                                const char *dash)
+{
+    const reach_line has = place_reach(&to->lines[index].place, to->lines[index].pace.in_flight);
+    reach own = *more;
+
+    /* What the lines share is for those that can have it. */
+    reach_fit(&own, &has);
+    reach_fill(&to->lines[index].place.reach, &own);
+    return reach_check(&to->lines[index].place.reach, &has, dash);
+}
+
 const char *gateway_setup_listen(gateway_setup *to, const char *text)
 {
     const char *wrong;
@@ -137,6 +159,7 @@ static int read_pace(yaml_file *file, const yaml_node_t *const *values, gateway_
 static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)
 {
     const yaml_node_t *values[LINE_KEYS] = {NULL};
+    reach own = {0};
     const char *text, *wrong;
 
     if (!yaml_file_keys(file, "the line", node, LINE_NAMES, 1u << LINE | 1u << UNITS, values))
@@ -154,7 +177,12 @@ static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *in
     if (wrong)
         return yaml_file_refuse(file, values[UNITS], "units: %s", wrong);
     into->lines[into->line_count - 1].pace = into->pace;
-    return read_pace(file, &values[LINE_TIMEOUT], &into->lines[into->line_count - 1].pace);
+    if (!read_pace(file, &values[LINE_TIMEOUT], &into->lines[into->line_count - 1].pace) ||
+        !reach_read_nodes(file, values + LINE_REACH, &own))
+        return 0;
+    reach_fill(&into->lines[into->line_count - 1].place.reach, &own);
+    wrong = gateway_setup_reach(into, into->line_count - 1u, &into->reach, "");
+    return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
 }
 
 static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
@@ -179,7 +207,8 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
                           &into->requests) ||
         !yaml_file_time(file, "idle", values[IDLE], 0, 1000000000, &into->idleMs) ||
         !yaml_file_time(file, "queue_time", values[QUEUE_TIME], 0, UINT16_MAX, &into->queueMs) ||
-        !read_pace(file, &values[TIMEOUT], &into->pace))
+        !read_pace(file, &values[TIMEOUT], &into->pace) ||
+        !reach_read_nodes(file, values + GATEWAY_REACH, &into->reach))
         return 0;
     count = yaml_file_items(file, "lines", values[THE_LINES], GATEWAY_LINES);
     for (at = 0; at < count; at++)

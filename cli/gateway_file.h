@@ -33,6 +33,7 @@ typedef struct gateway_setup {
     place listen;
     uint32_t idleMs, queueMs, connections, requests;
     gateway_pace pace; /* of lines that have no other */
+    reach reach;       /* the same, of the file */
 
     uint8_t line_count, route_count;
     struct {
@@ -49,6 +50,11 @@ typedef struct gateway_setup {
  * that the next call overwrites. */
 const char *gateway_setup_line(gateway_setup *to, const char *text);
 const char *gateway_setup_units(gateway_setup *to, const char *text);
+
+/* Adds to what a line's device needs, after what its name says. `dash` is before the names of keys:
+ * "--", or nothing. Returns as gateway_setup_line. */
+const char *gateway_setup_reach(gateway_setup *to, unsigned index, const reach *more,
+                                const char *dash);
 
 /* Reads the place where the gateway listens. Returns as gateway_setup_line. */
 const char *gateway_setup_listen(gateway_setup *to, const char *text);

@@ -13,12 +13,13 @@
 /* The gateway reports a line after SILENT_AFTER requests in a row without a right reply. */
 enum { SILENT_AFTER = 5 };
 
-void gateway_line_set(gateway_line *l, const gateway_pace *pace)
+void gateway_line_set(gateway_line *l, const gateway_pace *pace, const reach *what)
 {
     line_set(&l->at, pace->timeoutMs, (uint8_t)pace->in_flight, (uint8_t)pace->replace_after);
     l->in_flight = l->at.place.framing == MBM_FRAMING_TCP ? pace->in_flight : 1;
     (void)mbm_client_setQuietTime(&l->at.client, pace->quietMs);
     (void)mbm_link_setConnectTimeout(&l->at.kept, pace->timeoutMs);
+    line_reach(&l->at, what);
 }
 
 int gateway_line_begin(gateway_line *l, const place *where, const gateway_pace *pace)
@@ -36,7 +37,7 @@ int gateway_line_begin(gateway_line *l, const place *where, const gateway_pace *
     }
     l->text = text;
     l->at.is_logged = l->is_used = 1;
-    gateway_line_set(l, pace);
+    gateway_line_set(l, pace, &where->reach);
     return 1;
 }
 

@@ -22,7 +22,7 @@ typedef struct gateway_line {
 int gateway_line_begin(gateway_line *l, const place *where, const gateway_pace *pace);
 
 /* Sets what a reload may change of a line. */
-void gateway_line_set(gateway_line *l, const gateway_pace *pace);
+void gateway_line_set(gateway_line *l, const gateway_pace *pace, const reach *what);
 
 /* Makes a zeroed or closed line a place that refuses every request: requests that it had end. */
 void gateway_line_leave(gateway_line *l);

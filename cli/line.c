@@ -289,10 +289,7 @@ static void begin_client(line *l)
     if (place_is_serial(&l->place)) {
         (void)mbm_client_setBaudRate(&l->client, l->place.tty.baud);
         (void)mbm_client_setEchoDiscard(&l->client, l->place.discards_echo);
-        if (l->place.has_gap)
-            (void)mbm_client_setGap(&l->client, l->place.gapMs * 1000);
     }
-    (void)mbm_client_setRetries(&l->client, options.retries);
     (void)mbm_client_setCounters(&l->client, &l->counters);
 }
 
@@ -306,6 +303,39 @@ void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_af
         (void)mbm_link_setReplaceAfter(&l->kept, replace_after);
 }
 
+void line_reach(line *l, const reach *what)
+{
+    const reach_line has = place_reach(&l->place, 1);
+
+    l->place.reach = *what;
+    reach_fit(&l->place.reach, &has);
+    l->received.accept = l->place.reach.accept;
+    reach_set(&l->place.reach, &l->client, has.has_link ? &l->kept : NULL, &has,
+              l->place.has_gap ? l->place.gapMs * 1000 : 0);
+}
+
+const char *line_add_reach(place *where, const reach *of_device, uint32_t in_flight)
+{
+    const reach_line has = place_reach(where, in_flight);
+    reach own = *of_device;
+
+    reach_fit(&own, &has);
+    reach_fill(&where->reach, &options.reach);
+    reach_fill(&where->reach, &own);
+    return reach_check(&where->reach, &has, "");
+}
+
+/* Checks what the name of the line and the options say together. Returns an exit code. */
+static int check_reach(line *l)
+{
+    const reach_line has = place_reach(&l->place, options.in_flight);
+    const char *wrong;
+
+    reach_fill(&l->place.reach, &options.reach);
+    wrong = reach_check(&l->place.reach, &has, "--");
+    return wrong ? report(CODE_WRONG, "%s: %s", l->place.text, wrong) : CODE_DONE;
+}
+
 static int open_place(line *l, const place *where, int (*open_serial)(line *l),
                       int (*open_stream)(line *l))
 {
@@ -313,6 +343,9 @@ static int open_place(line *l, const place *where, int (*open_serial)(line *l),
 
     memset(l, 0, sizeof *l);
     l->place = *where;
+    code = check_reach(l);
+    if (code != CODE_DONE)
+        return code;
     code = place_is_serial(where)     ? open_serial(l)
            : where->kind == PLACE_UDP ? open_udp(l)
            : where->kind == PLACE_TLS ? open_tls(l)
@@ -324,6 +357,7 @@ static int open_place(line *l, const place *where, int (*open_serial)(line *l),
     begin_client(l);
     keep_open(l);
     line_set(l, options.timeoutMs, options.in_flight, options.replace_after);
+    line_reach(l, &l->place.reach);
     if (where->framing == MBM_FRAMING_TCP)
         report_set_in_flight(options.in_flight);
     return CODE_DONE;

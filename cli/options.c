@@ -22,7 +22,6 @@ enum {
     TRACE = 0x1000,
     PCAP,
     TIMEOUT,
-    RETRIES,
     IN_FLIGHT,
     REPLACE_AFTER,
     JSON,
@@ -91,7 +90,7 @@ int options_word(const struct argp_state *state, const char *what, const char *t
 unsigned options_units(const struct argp_state *state, const char *what, const char *text,
                        uint8_t units[OPTIONS_UNITS])
 {
-    uint8_t is_given[OPTIONS_UNITS + 1] = {0};
+    uint8_t is_given[OPTIONS_UNITS] = {0};
     unsigned count = 0, unit;
     size_t length;
 
@@ -106,16 +105,16 @@ unsigned options_units(const struct argp_state *state, const char *what, const c
         dash = length > 0 ? strchr(item + 1, '-') : NULL;
         if (dash)
             *dash++ = '\0';
-        first = last = options_number(state, what, item, 1, OPTIONS_UNITS);
+        first = last = options_number(state, what, item, 0, OPTIONS_UNITS - 1);
         if (dash)
-            last = options_number(state, what, dash, first, OPTIONS_UNITS);
+            last = options_number(state, what, dash, first, OPTIONS_UNITS - 1);
         for (; first <= last; first++)
             if (is_given[first]++)
                 options_wrong(state, "%s: unit %u is there twice", what, (unsigned)first);
         if (!text[length])
             break;
     }
-    for (unit = 1; unit <= OPTIONS_UNITS; unit++)
+    for (unit = 0; unit < OPTIONS_UNITS; unit++)
         if (is_given[unit])
             units[count++] = (uint8_t)unit;
     return count;
@@ -149,15 +148,28 @@ void options_too_many(const struct argp_state *state, const char *text)
     options_wrong(state, "\"%s\" is one word too many", text);
 }
 
+static int has_unit_0(const place *where)
+{
+    return where->framing == MBM_FRAMING_TCP;
+}
+
 void options_check_unit(const struct argp_state *state, const place *where, int is_write)
 {
-    /* In TCP frames unit 0 is a unit. */
-    const int may_be_0 = place_is_serial(where) ? is_write : where->kind != PLACE_RTU_OVER_TCP;
+    const int may_be_0 = has_unit_0(where) || (place_is_serial(where) && is_write);
 
     if (options.unit == 0 && !may_be_0)
         options_wrong(state,
                       "--unit 0 means all units, for writes on a serial line only; here 1 to 255 "
                       "is allowed");
+}
+
+void options_check_units(const struct argp_state *state, const place *where, const uint8_t *units)
+{
+    /* They are in ascending order. */
+    if (units[0] == 0 && !has_unit_0(where))
+        options_wrong(state,
+                      "unit 0 is read in frames of Modbus TCP only: on a serial line it is a "
+                      "broadcast, which no device answers");
 }
 
 /* --- tracing --- */
@@ -191,9 +203,6 @@ static error_t parse_request(int key, char *text, struct argp_state *state)
         options.timeoutMs = options_time(state, "--timeout", text, 1, 1000000);
         options.has_timeout = 1;
         return 0;
-    case RETRIES:
-        options.retries = (uint8_t)options_number(state, "--retries", text, 0, 254);
-        return 0;
     case IN_FLIGHT:
         options.in_flight =
             (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
@@ -208,8 +217,6 @@ static error_t parse_request(int key, char *text, struct argp_state *state)
 
 static const struct argp_option request_texts[] = {
     {"timeout", TIMEOUT, "TIME", 0, "How long a reply may take, such as 500ms or 2s (1s)", 2},
-    {"retries", RETRIES, "N", 0,
-     "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
     {"in-flight", IN_FLIGHT, "N", 0,
      "Requests in flight at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
      "one at a time",
@@ -220,7 +227,58 @@ static const struct argp_option request_texts[] = {
      2},
     {0}};
 
-const struct argp options_request = {.options = request_texts, .parser = parse_request};
+/* --- what the device needs --- */
+
+/* The key of an option is REACH and the number of the key. */
+enum { REACH = 0x3000 };
+
+static error_t parse_reach(int key, char *text, struct argp_state *state)
+{
+    const int which = key - REACH;
+    char option[32], *at = option;
+    const char *wrong;
+
+    if (which < 0 || which >= REACH_KEYS)
+        return ARGP_ERR_UNKNOWN;
+    wrong = reach_read(&options.reach, which, text ? text : "yes");
+    snprintf(option, sizeof option, "%s", reach_names[which]);
+    while ((at = strchr(at, '_')) != NULL)
+        *at = '-';
+    if (wrong)
+        options_wrong(state, "--%s %s", option, wrong);
+    return 0;
+}
+
+static const struct argp_option reach_texts[] = {
+    {"accept", REACH + REACH_ACCEPT, "WHAT", 0,
+     "On Modbus TCP, take replies with another unit or transaction number: unit, transaction, or "
+     "unit,transaction",
+     2},
+    {"lenient", REACH + REACH_LENIENT, NULL, 0,
+     "Take replies with more data than requested, and to writes that repeat something else", 2},
+    {"delay", REACH + REACH_DELAY, "TIME", 0,
+     "Send nothing for this time after connecting, up to 65s (0s)", 2},
+    {"message-wait", REACH + REACH_MESSAGE_WAIT, "TIME", 0,
+     "The least time from the end of a request to the next one, up to 65s (0s)", 2},
+    {"close", REACH + REACH_CLOSE, "WHEN", 0,
+     "Close the connection never, after each round or after an error: never, round, error, or "
+     "round,error (never; error with --accept transaction)",
+     2},
+    {"retries", REACH + REACH_RETRIES, "N", 0,
+     "How often a request without a right reply is repeated, 0 to 254 (0)", 2},
+    {"busy-retries", REACH + REACH_BUSY_RETRIES, "N", 0,
+     "How often a request is repeated that the device refuses as busy: with exception 06, and a read "
+     "also with 05, 0 to 254 (0)",
+     2},
+    {"busy-wait", REACH + REACH_BUSY_WAIT, "TIME", 0,
+     "The time before each of these, up to 65s (100ms)", 2},
+    {0}};
+
+const struct argp options_reach = {.options = reach_texts, .parser = parse_reach};
+
+static const struct argp_child request_children[] = {{.argp = &options_reach}, {0}};
+const struct argp options_request = {
+    .options = request_texts, .parser = parse_request, .children = request_children};
 
 static error_t parse_output(int key, char *text, struct argp_state *state)
 {
@@ -257,7 +315,10 @@ static error_t parse_unit(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option unit_texts[] = {
-    {"unit", 'u', "N", 0, "The unit id of the device, 1 to 255; 0 writes to all (1)", 1}, {0}};
+    {"unit", 'u', "N", 0,
+     "The unit id of the device, 1 to 255; on Modbus TCP also 0, on a serial line 0 writes to all (1)",
+     1},
+    {0}};
 
 const struct argp options_unit = {.options = unit_texts, .parser = parse_unit};
 

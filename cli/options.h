@@ -8,6 +8,7 @@
 #define OPTIONS_H
 
 #include "conversion.h"
+#include "reach.h"
 #include "value.h"
 
 #include <argp.h>
@@ -18,7 +19,9 @@ struct place;
 typedef struct client_options {
     /* of options_request */
     uint32_t timeoutMs;
-    uint8_t has_timeout, retries, in_flight, has_replace_after, replace_after;
+    uint8_t has_timeout, in_flight, has_replace_after, replace_after;
+    /* of options_reach */
+    reach reach;
     /* of options_output */
     uint8_t is_json, is_quiet;
     /* of options_unit */
@@ -35,7 +38,9 @@ extern client_options options;
 
 /* --trace and --pcap; a program that is no client has these alone. */
 extern const struct argp options_trace;
-/* --timeout, --retries, --in-flight, --replace-after. */
+/* --accept, --lenient, --delay, --message-wait, --close, --retries, --busy-retries, --busy-wait. */
+extern const struct argp options_reach;
+/* --timeout, --in-flight, --replace-after, and those of options_reach. */
 extern const struct argp options_request;
 /* --json, --quiet. */
 extern const struct argp options_output;
@@ -56,9 +61,10 @@ uint32_t options_time(const struct argp_state *state, const char *what, const ch
 int options_word(const struct argp_state *state, const char *what, const char *text,
                  const char *const *words);
 
-/* Reads unit ids such as 1,17,30-39, and puts them in ascending order. Returns how many they are.
+/* Reads unit ids from 0 to 255 such as 1,17,30-39, and puts them in ascending order. Returns how
+ * many they are.
  */
-enum { OPTIONS_UNITS = 255 };
+enum { OPTIONS_UNITS = 256 };
 unsigned options_units(const struct argp_state *state, const char *what, const char *text,
                        uint8_t units[OPTIONS_UNITS]);
 
@@ -72,7 +78,11 @@ void options_wrong(const struct argp_state *state, const char *format, ...)
 /* Refuses a word after the last one that a command takes. */
 void options_too_many(const struct argp_state *state, const char *text) __attribute__((noreturn));
 
-/* Refuses unit 0, unless a client writes on a serial line. */
+/* Refuses unit 0, unless it is a unit of Modbus TCP, or a client writes on a serial line. */
+/* Refuses unit 0 among units that are read, unless it is a unit of Modbus TCP. */
+void options_check_units(const struct argp_state *state, const struct place *where,
+                         const uint8_t *units);
+
 void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
 
 /* Reads the LINE of a client, or of a server. */

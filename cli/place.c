@@ -90,10 +90,11 @@ static int read_tls_key(place *p, const char *key, const char *value, const char
 }
 
 /* Reads KEY=VALUE&KEY=VALUE. */
-static const char *read_keys(place *p, char *keys)
+static const char *read_keys(place *p, char *keys, int is_server)
 {
     char *rest, *word;
-    char seen[256] = "&";
+    char seen[400] = "&";
+    int i;
 
     for (word = strtok_r(keys, "&", &rest); word; word = strtok_r(NULL, "&", &rest)) {
         char *value = strchr(word, '='), key[32];
@@ -106,12 +107,21 @@ static const char *read_keys(place *p, char *keys)
         is_known = place_is_serial(p)     ? read_serial_key(p, word, value, &wrong)
                    : p->kind == PLACE_TLS ? read_tls_key(p, word, value, &wrong)
                                           : 0;
-        if (!is_known && !*kinds[p->kind].keys)
+        for (i = 0; i < REACH_KEYS && !is_known && !is_server; i++)
+            if (strcmp(word, reach_names[i]) == 0) {
+                wrong = reach_read(&p->reach, i, value);
+                is_known = 1;
+            }
+        if (!is_known && !*kinds[p->kind].keys && is_server)
             return say("%s: \"%s\" is unknown: %s has no keys", p->text, word,
                        kinds[p->kind].scheme);
         if (!is_known)
-            return say("%s: the key \"%s\" is unknown: %s has %s", p->text, word,
-                       kinds[p->kind].scheme, kinds[p->kind].keys);
+            return say("%s: the key \"%s\" is unknown: %s has %s%s%s", p->text, word,
+                       kinds[p->kind].scheme, kinds[p->kind].keys,
+                       is_server              ? ""
+                       : *kinds[p->kind].keys ? "; and "
+                                              : "",
+                       is_server ? "" : REACH_WORDS);
         if (wrong) {
             char copy[400];
 
@@ -210,10 +220,26 @@ const char *place_read(place *p, const char *text, int is_server)
         *keys++ = '\0';
     wrong = place_is_serial(p) ? read_path(p, copy, is_server) : read_host(p, copy, is_server);
     if (!wrong && keys)
-        wrong = read_keys(p, keys);
+        wrong = read_keys(p, keys, is_server);
     if (!wrong && p->kind == PLACE_TLS && !(*p->ca && *p->cert && *p->key))
         wrong = say("%s: tls:// needs the keys ca, cert and key, each a file", text);
+    if (!wrong && keys) {
+        const reach_line line = place_reach(p, 1);
+
+        wrong = reach_check(&p->reach, &line, "");
+        if (wrong) {
+            snprintf(copy, sizeof copy, "%s", wrong);
+            wrong = say("%s: %s", text, copy);
+        }
+    }
     return wrong;
+}
+
+reach_line place_reach(const place *p, uint32_t in_flight)
+{
+    return (reach_line){.framing = p->framing,
+                        .has_link = p->kind != PLACE_UDP,
+                        .in_flight = p->framing == MBM_FRAMING_TCP ? in_flight : 1};
 }
 
 int place_is_serial(const place *p)

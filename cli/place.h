@@ -5,6 +5,7 @@
  *     tcp://192.168.0.7        tcp://meter.example:1502        tcp://[::1]:1502
  *     rtu+tcp://192.168.0.7:4001
  *     udp://192.168.0.7
+ *     tcp://192.168.0.7?accept=unit&message_wait=30ms
  *     tls://192.168.0.7?ca=ca.pem&cert=me.pem&key=me.key.pem&name=meter.example
  *
  * A server listens at the place: tcp://:1502 at all addresses of the machine, with port 0 at a free
@@ -16,6 +17,7 @@
 
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
+#include "reach.h"
 
 #include <stdint.h>
 
@@ -29,7 +31,10 @@
     "  rtu+tcp://HOST:PORT         RTU frames in a TCP stream\n"                                   \
     "  udp://HOST[:PORT]           Modbus TCP frames in datagrams, port 502\n"                     \
     "  tls://HOST[:PORT]?ca=FILE&cert=FILE&key=FILE[&name=NAME]\n"                                 \
-    "                              Modbus/TCP Security, port 802\n"
+    "                              Modbus/TCP Security, port 802\n"                                \
+    "Each line of a client may have keys for its device, as the options of these names:\n"         \
+    "  accept=unit,transaction, lenient=yes, delay=2s, message_wait=30ms,\n"                       \
+    "  close=never|round|error, retries=3, busy_retries=3, busy_wait=100ms\n"
 
 enum place_kind {
     PLACE_RTU,
@@ -54,6 +59,8 @@ typedef struct place {
     uint8_t has_echo, discards_echo, has_gap, has_latency;
     uint32_t gapMs, latencyMs;
 
+    reach reach; /* of clients */
+
     /* of networks; an empty host is all addresses of this machine, for servers only */
     char host[MBM_TCP_HOST_BYTES];
     char service[8];
@@ -64,6 +71,9 @@ typedef struct place {
 /* Reads a name. `is_server` admits what only servers have: pty:, no host, port 0. Returns NULL, or
  * what is wrong as a sentence without its full stop, in a buffer that the next call overwrites. */
 const char *place_read(place *p, const char *text, int is_server);
+
+/* What the line can have of a reach, with so many requests in flight. */
+reach_line place_reach(const place *p, uint32_t in_flight);
 
 /* Whether it is a terminal, whether it is a TCP connection with or without TLS. */
 int place_is_serial(const place *p);

@@ -388,12 +388,19 @@ int poll_command(int argc, char **argv)
     static polling data = {.gap = DEVICE_PLAN_OWN_GAP};
     polling *p = &data;
     char wrong[YAML_FILE_WRONG_BYTES];
+    const char *why;
     int code;
 
     argp_parse(&arguments, argc, argv, 0, NULL, p);
     code = device_file_read(&p->read.meter, p->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
+    why = line_add_reach(&p->where, &p->read.meter.reach, options.in_flight);
+    if (why)
+        return report(CODE_WRONG, "%s: %s", p->file, why);
+    why = device_plan_check(&p->read.meter, p->file, p->where.framing);
+    if (why)
+        return report(CODE_WRONG, "%s", why);
     code = line_open(&p->read.at, &p->where);
     if (code == CODE_DONE) {
         if (p->rounds == 1)

@@ -153,13 +153,17 @@ static error_t parse(int key, char *text, struct argp_state *state)
         else
             options_too_many(state, text);
         return 0;
-    case ARGP_KEY_SUCCESS: check_arguments(r, state); return 0;
+    case ARGP_KEY_SUCCESS:
+        check_arguments(r, state);
+        options_check_units(state, &r->where, r->units);
+        return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 
 static const struct argp_option texts[] = {
-    {"unit", 'u', "LIST", 0, "The unit ids to read, 1 to 255, such as 17 or 1,17,30-39 (1)", 1},
+    {"unit", 'u', "LIST", 0,
+     "The unit ids to read, 1 to 255, on Modbus TCP also 0, such as 17 or 1,17,30-39 (1)", 1},
     {"every", EVERY, "TIME", 0, "Read again and again, such as every 500ms or 2s, until Ctrl-C", 0},
     {"times", TIMES, "N", 0, "With --every: so many times", 0},
     {"precision", PRECISION, "N", 0, "Show N digits after the point, 0 to 18", 1},

@@ -47,10 +47,27 @@ static int of_sent(const received *from, int (*each)(const uint8_t *frame, void 
     return found;
 }
 
+/* Whether a frame with this transaction number came since the last request. */
+static int has_come(const received *from, unsigned transaction)
+{
+    const size_t have = from->count < RECEIVED_BYTES ? from->count : RECEIVED_BYTES;
+    size_t at = 0;
+
+    while (at + MBAP <= have) {
+        if (number_at(from->bytes + at) == transaction)
+            return 1;
+        at += COUNTED + number_at(from->bytes + at + 4);
+    }
+    return 0;
+}
+
+/* Notes a request that has got no reply with its number: that may still come. */
 static int note_earlier(const uint8_t *frame, void *context)
 {
     received *to = (received *)context;
 
+    if (has_come(to, number_at(frame)))
+        return 0;
     to->earlier[to->earlier_count++ % RECEIVED_EARLIER] = (uint16_t)number_at(frame);
     return 0;
 }
@@ -122,13 +139,21 @@ static const char *text_of_tcp(const received *from)
     if (!of_sent(from, has_transaction, &transaction)) {
         if (is_earlier(from, transaction))
             return "a reply to an earlier request came; a slow device needs a longer --timeout";
-        return say("a reply came with transaction number %u, and the request had %u", transaction,
-                   number_at(from->sent));
+        return from->accept & MBM_ACCEPT_TRANSACTION
+                   ? say("a reply came with transaction number %u that does not answer the request",
+                         transaction)
+                   : say("a reply with transaction number %u came, and the request had %u; --accept "
+                         "transaction takes it",
+                         transaction, number_at(from->sent));
     }
     if (from->count < COUNTED + length)
         return say("a reply came whose header announces %u bytes, and %u came", length,
                    (unsigned)from->count - COUNTED);
-    return bytes[6] != from->sent[6] ? say("a reply of unit %u came", bytes[6]) : NULL;
+    if (bytes[6] == from->sent[6])
+        return NULL;
+    return from->accept & MBM_ACCEPT_UNIT
+               ? say("a reply of unit %u came", bytes[6])
+               : say("a reply of unit %u came; --accept unit takes it", bytes[6]);
 }
 
 int received_is_echo(const received *from)

@@ -11,6 +11,7 @@ enum { RECEIVED_SENT = 1024, RECEIVED_BYTES = 300, RECEIVED_EARLIER = 32 };
 typedef struct received {
     mbm_port below;
     uint8_t framing;             /* one of MBM_FRAMING_ */
+    uint8_t accept;              /* MBM_ACCEPT_: what the client takes */
     uint8_t sent[RECEIVED_SENT]; /* what the last write sent: of Modbus TCP any number of frames */
     uint16_t sent_count;
     uint8_t bytes[RECEIVED_BYTES];      /* the first that came since then */

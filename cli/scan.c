@@ -77,6 +77,7 @@ static void check_arguments(scanning *s, const struct argp_state *state)
                       "--parities");
     if (s->unit_count == 0)
         s->unit_count = options_units(state, "--units", s->is_sunspec ? "1" : "1-247", s->units);
+    options_check_units(state, &s->where, s->units);
     if (s->rate_count == 0)
         s->rates[s->rate_count++] = s->where.tty.baud;
     if (s->parity_count == 0)
@@ -108,7 +109,8 @@ static error_t parse(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option texts[] = {
-    {"units", UNITS_KEY, "LIST", 0, "The units to try, such as 1-20,100 (1-247)", 1},
+    {"units", UNITS_KEY, "LIST", 0,
+     "The units to try, such as 1-20,100; on Modbus TCP also 0 (1-247)", 1},
     {"rates", RATES_KEY, "LIST", 0, "Baud rates to try, such as 9600,19200 (that of LINE)", 1},
     {"parities", PARITIES_KEY, "LIST", 0, "Parities to try, of none,even,odd (that of LINE)", 1},
     {"sunspec", SUNSPEC, NULL, 0, "List the SunSpec models of the units (--units 1)", 1},

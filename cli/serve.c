@@ -3,6 +3,7 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
+#include "device_plan.h"
 #include "fault_device.h"
 #include "line.h"
 #include "numbers.h"
@@ -431,7 +432,7 @@ enum { RANDOM_KEY = 0x2000, ECHO_KEY, FAULT_KEY };
 /* Checks what was given, once all of it is known. */
 static void check(serving *s, const struct argp_state *state)
 {
-    uint32_t i;
+    uint32_t i, count;
 
     if (!s->place_text)
         options_wrong(state, "LINE is missing, such as pty: or tcp://:1502");
@@ -448,8 +449,11 @@ static void check(serving *s, const struct argp_state *state)
     }
     if (fault_check(&s->line.faults.list))
         options_wrong(state, "--fault %s", fault_check(&s->line.faults.list));
-    s->id_count =
-        (uint8_t)options_units(state, "--unit", s->unit_text ? s->unit_text : "1", s->ids);
+    count = options_units(state, "--unit", s->unit_text ? s->unit_text : "1", s->ids);
+    if (count > UINT8_MAX)
+        options_wrong(state, "--unit: these are %u units, and up to 255 are served", count);
+    options_check_units(state, &s->where, s->ids);
+    s->id_count = (uint8_t)count;
 }
 
 static error_t parse(int key, char *text, struct argp_state *state)
@@ -561,7 +565,10 @@ int serve_command(int argc, char **argv)
         code = device_file_read(&from, s->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    code = make_units(s, &from, &hook);
+    if (s->file && device_plan_check(&from, s->file, s->where.framing))
+        code = report(CODE_WRONG, "%s", device_plan_check(&from, s->file, s->where.framing));
+    if (code == CODE_DONE)
+        code = make_units(s, &from, &hook);
     if (code == CODE_DONE)
         code = serve(s);
     served_free(&s->units);

@@ -258,12 +258,12 @@ static void add_field(served_units *units, const device_field *field, const mbm_
 
 int served_make_device(served_units *units, const device *from, served_hook *hook)
 {
-    uint8_t ids[255], is_known[256] = {0}, count = 0, table;
+    uint8_t ids[256], is_known[256] = {0}, count = 0, table;
     uint16_t i;
 
     for (i = 0; i < from->count; i++)
         is_known[from->planned[i].unit] = 1;
-    for (i = 1; i <= 255; i++)
+    for (i = 0; i <= 255; i++)
         if (is_known[i])
             ids[count++] = (uint8_t)i;
     if (begin(units, SERVED_DEVICE, ids, count, from->name, hook) != 0)

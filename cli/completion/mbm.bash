@@ -22,7 +22,7 @@ _mbm() {
         words=$(mbm "$command" --help | grep -o -e '--[a-z][a-z-]*')
     else
         case $before in
-        --table | --type | --order | --category | --parities | --framing | --log-level | --discovery | --write-function | -[a-zA-Z])
+        --table | --type | --order | --category | --parities | --framing | --log-level | --discovery | --write-function | --accept | --close | -[a-zA-Z])
             words=$(_mbm_words "$command" "$before") ;;
         import) words=$(_mbm_words import '') ;;
         --rates) words="1200 2400 4800 9600 19200 38400 57600 115200" ;;

@@ -32,7 +32,7 @@ read @LINE 65534 1 --type double|4 addresses from 65534 on end beyond
 read @LINE 1 2 3|"3" is one word too many
 read @LINE 1 --unit 256|--unit "256" is out of range
 read @LINE 1 --unit=-1|--unit "-1" is not
-read @LINE 1 --unit 0|--unit "0" is out of range: from 1 to 255
+read rtu:/dev/null 1 --unit 0|unit 0 is read in frames of Modbus TCP only
 read @LINE 1 --unit 1,|--unit "" is not a whole
 read @LINE 1 --unit 1-3,2|--unit: unit 2 is there twice
 write rtu+tcp://127.0.0.1:1 1 1 --unit 0|--unit 0 means all units
@@ -82,7 +82,7 @@ call @LINE 0x03|HEX "0x03" is not hexadecimal bytes
 call @LINE 83 00|HEX begins with 83: a function code is 01 to 7F
 scan|LINE is missing
 scan @LINE more|"more" is one word too many
-scan @LINE --units 0|--units "0" is out of range
+scan rtu:/dev/null --units 0|unit 0 is read in frames of Modbus TCP only
 scan @LINE --units 5-3|--units "3" is out of range: from 5 to 255
 scan @LINE --units 1,|--units "" is not
 scan @LINE --units 1-3,2|unit 2 is there twice
@@ -101,7 +101,7 @@ read tcp://127.0.0.1,502 1|is not a host
 read tcp://::1 1|an IPv6 address needs brackets
 read tcp://[::1 1|the bracket after the address is missing
 read tcp://[::1]502 1|after the address is not :PORT
-read tcp://127.0.0.1?unit=1 1|"unit" is unknown: tcp:// has no keys
+read tcp://127.0.0.1?unit=1 1|the key "unit" is unknown: tcp:// has accept, lenient, delay
 read rtu+tcp://127.0.0.1 1|the port is missing
 read rtu: 1|the path of the terminal is missing
 3 read rtu:/dev/null? 1|
@@ -125,7 +125,7 @@ serve pty: @FILE --echo|give a device FILE, or --random, or --echo
 serve pty: --random --echo|give a device FILE, or --random, or --echo
 serve pty: @FILE more|"more" is one word too many
 serve pty: @FILE -u 3|--unit goes with --random and --echo
-serve pty: --echo -u 0|--unit "0" is out of range: from 1 to 255 is allowed
+serve pty: --echo -u 0|unit 0 is read in frames of Modbus TCP only
 serve pty: --echo -u 9-5|--unit "5" is out of range: from 9 to 255 is allowed
 serve pty: --echo -u ,|--unit "" is not a whole decimal number
 serve pty: --echo -u 1,,2|--unit "" is not a whole decimal number
