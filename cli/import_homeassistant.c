@@ -478,6 +478,8 @@ static void import_hub(import *j, tree *hub)
     if (strcmp(pause, "0") != 0)
         import_set(j, IMPORT_HEAD, line_of(hub, "message_wait_milliseconds"), "message_wait",
                    "%sms", pause);
+    if (is_true(tree_text(hub, "close_comm_on_error", NULL)))
+        import_set(j, IMPORT_HEAD, line_of(hub, "close_comm_on_error"), "close", "error");
     if (timeout)
         import_lose(j, line_of(hub, "timeout"), "timeout",
                     "it is an option of the commands: --timeout %ss", timeout);

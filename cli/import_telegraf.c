@@ -71,6 +71,7 @@ static const type_of_theirs *find_type(const char *theirs, unsigned addresses)
 /* What a field takes from its request. */
 typedef struct context {
     const char *table, *order, *unit, *measurement;
+    const char *location; /* of the characters of a text in a register: lower, upper or both */
     int is_bits;
 } context;
 
@@ -91,8 +92,9 @@ static unsigned begin(import *j, tree *from, const context *of)
 
 /* Sets type, count and order. Returns 0 if there is no such type here. */
 static int set_type(import *j, unsigned field, tree *from, const char *theirs, unsigned addresses,
-                    const char *order)
+                    const char *order, const char *location)
 {
+    const int is_lower = strcmp(location, "lower") == 0, is_upper = strcmp(location, "upper") == 0;
     const type_of_theirs *type = find_type(theirs, addresses);
     const int is_byte = strcmp(theirs, "UINT8L") == 0 || strcmp(theirs, "UINT8H") == 0;
     const char *length = tree_text(from, "length", NULL), *bit = tree_text(from, "bit", NULL);
@@ -108,10 +110,17 @@ static int set_type(import *j, unsigned field, tree *from, const char *theirs, u
                     "the type %s has no counterpart: the field is left out", theirs);
         return 0;
     }
-    import_set(j, field, from->line, "type", "%s", type->ours);
-    if (strcmp(type->ours, "text") == 0)
+    if (strcmp(type->ours, "text") == 0) {
+        import_set(j, field, from->line, "type", "text%s",
+                   is_lower   ? "_low"
+                   : is_upper ? "_high"
+                              : "");
         import_set(j, field, from->line, "count", "%lu",
-                   2 * (length ? strtoul(length, NULL, 10) : addresses));
+                   (is_lower || is_upper ? 1 : 2) *
+                       (length ? strtoul(length, NULL, 10) : addresses));
+    } else {
+        import_set(j, field, from->line, "type", "%s", type->ours);
+    }
     if (strcmp(type->ours, "bit") == 0)
         import_set(j, field, from->line, "bit", "%s", bit ? bit : "0");
     if (addresses > 0 && type->registers > 0 && addresses != type->registers)
@@ -171,7 +180,7 @@ static void import_register(import *j, tree *from, const context *of)
         import_set(j, field, from->line, "address", "%s", first);
     if (count == 0 ||
         (!of->is_bits && !set_type(j, field, from, tree_text(from, "data_type", "INT16"), count,
-                                   tree_text(from, "byte_order", NULL)))) {
+                                   tree_text(from, "byte_order", NULL), of->location))) {
         tree_use(from);
         import_drop(j);
         return;
@@ -181,9 +190,11 @@ static void import_register(import *j, tree *from, const context *of)
     import_lose_rest(j, from, import_name(j, field));
 }
 
-static void import_registers(import *j, tree *plugin, const char *key, const char *table)
+static void import_registers(import *j, tree *plugin, const char *key, const char *table,
+                             const char *location)
 {
-    const context of = {.table = table, .is_bits = table[0] == 'c' || table[0] == 'd'};
+    const context of = {
+        .table = table, .location = location, .is_bits = table[0] == 'c' || table[0] == 'd'};
     tree *list = tree_find(plugin, key), *at;
 
     for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
@@ -220,7 +231,8 @@ static void import_requested(import *j, tree *from, const context *of)
     /* The type of what telegraf stores: mbm keeps numbers exactly. */
     (void)tree_find(from, "output");
     if (!own.is_bits) {
-        if (!set_type(j, field, from, tree_text(from, "type", "INT16"), 0, of->order)) {
+        if (!set_type(j, field, from, tree_text(from, "type", "INT16"), 0, of->order,
+                      of->location)) {
             tree_use(from);
             import_drop(j);
             return;
@@ -230,12 +242,13 @@ static void import_requested(import *j, tree *from, const context *of)
     import_lose_rest(j, from, import_name(j, field));
 }
 
-static void import_request(import *j, tree *request)
+static void import_request(import *j, tree *request, const char *location)
 {
     context of = {.table = table_of(tree_text(request, "register", "holding")),
                   .order = tree_text(request, "byte_order", "ABCD"),
                   .unit = tree_text(request, "slave_id", NULL),
-                  .measurement = tree_text(request, "measurement", NULL)};
+                  .measurement = tree_text(request, "measurement", NULL),
+                  .location = location};
     tree *fields = tree_find(request, "fields"), *at;
 
     for (at = fields && fields->kind == TREE_LIST ? fields->first : NULL; at; at = at->next)
@@ -244,13 +257,13 @@ static void import_request(import *j, tree *request)
     import_lose_rest(j, request, "a request");
 }
 
-static void import_requests(import *j, tree *plugin, const char *key)
+static void import_requests(import *j, tree *plugin, const char *key, const char *location)
 {
     tree *list = tree_find(plugin, key), *at;
 
     for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
         if (at->kind == TREE_MAP)
-            import_request(j, at);
+            import_request(j, at, location);
 }
 
 /* --- a plugin --- */
@@ -285,7 +298,7 @@ static void make_line(import *j, tree *plugin)
         j->line = NULL;
 }
 
-/* Moves a time to the head, if it is not 0. */
+/* Moves a time or a number to the head, if it is not 0. */
 static void set_time(import *j, tree *from, const char *theirs, const char *ours)
 {
     const char *text = tree_text(from, theirs, NULL);
@@ -311,7 +324,8 @@ static void import_plugin(import *j, tree *plugin, tree *agent)
 {
     const char *name = tree_text(plugin, "name", NULL);
     const char *timeout = tree_text(plugin, "timeout", NULL);
-    const char *retries = tree_text(plugin, "busy_retries", "0");
+    const char *location =
+        tree_text(tree_find(plugin, "workarounds"), "string_register_location", "both");
 
     if (!j->line)
         make_line(j, plugin);
@@ -327,16 +341,15 @@ static void import_plugin(import *j, tree *plugin, tree *agent)
     if (timeout)
         import_lose(j, tree_peek(plugin, "timeout")->line, "timeout",
                     "it is an option of the commands: --timeout %s", timeout);
-    if (strcmp(retries, "0") != 0)
-        import_lose(j, tree_peek(plugin, "busy_retries")->line, "busy_retries",
-                    "it is an option of the commands: --retries %s", retries);
+    set_time(j, plugin, "busy_retries", "busy_retries");
+    set_time(j, plugin, "busy_retries_wait", "busy_wait");
     import_workarounds(j, plugin);
-    import_registers(j, plugin, "discrete_inputs", "discrete");
-    import_registers(j, plugin, "coils", "coils");
-    import_registers(j, plugin, "input_registers", "input");
-    import_registers(j, plugin, "holding_registers", "holding");
-    import_requests(j, plugin, "request");
-    import_requests(j, plugin, "metric");
+    import_registers(j, plugin, "discrete_inputs", "discrete", location);
+    import_registers(j, plugin, "coils", "coils", location);
+    import_registers(j, plugin, "input_registers", "input", location);
+    import_registers(j, plugin, "holding_registers", "holding", location);
+    import_requests(j, plugin, "request", location);
+    import_requests(j, plugin, "metric", location);
     import_lose_rest(j, plugin, "inputs.modbus");
 }
 

@@ -89,6 +89,7 @@ REQUESTS = """\
       { address=0, type="INT16", name="speed", scale=0.1, output="FLOAT64" },
       { address=1, type="UINT32", name="hours" },
       { address=9, type="UINT32", name="hidden", omit=true },
+      { address=24, type="FLOAT16", name="half" },
     ]
   [[inputs.modbus.request]]
     slave_id = 3
@@ -106,7 +107,10 @@ METRICS = """\
     fields = [
       { register="input", address=3, type="UINT16", name="level" },
       { register="discrete", address=2, name="full" },
+      { register="holding", address=1, type="STRING", length=3, name="low" },
     ]
+  [inputs.modbus.workarounds]
+    string_register_location = "lower"
 """
 POINT = '{"name": "%s", "type": "%s", "size": %s%s}'
 MODEL = '{"id": 64999, "group": {"name": "pump", "label": "A Pump", "type": "group", "points": [\n%s],\n"groups": [{"name": "stage", "count": 2, ' \
@@ -194,10 +198,11 @@ def test_requests_and_metrics_of_telegraf_are_read(imported, polled):
     file, said = imported("telegraf", REQUESTS)
     assert said == ""
     turned = lambda *addresses: int.from_bytes(wide(*addresses)[::-1], "big", signed=len(addresses) == 1)
-    assert polled(file) == {"motor speed": near(turned(0) * 0.1), "motor hours": turned(1, 2), "door": bool(bit(4))}
+    assert polled(file) == {"motor speed": near(turned(0) * 0.1), "motor hours": turned(1, 2), "door": bool(bit(4)),
+                            "motor half": pytest.approx(struct.unpack("<e", wide(24))[0], rel=1e-3)}
     file, said = imported("telegraf", METRICS)
     assert said == ""
-    assert polled(file) == {"tank level": word(3) ^ 0xFFFF, "tank full": not bit(2)}
+    assert polled(file) == {"tank level": word(3) ^ 0xFFFF, "tank full": not bit(2), "tank low": wide(1, 2, 3)[1::2].decode("latin-1")}
 
 
 def test_a_model_of_sunspec_is_read_where_it_begins(imported, polled):
@@ -265,7 +270,7 @@ def plugin(lines):
     ("telegraf", plugin('{name="a", data_type="INT32", address=[1, 3]}'), "4: a: its addresses do not follow each other: the field is left out."),
     ("telegraf", plugin('{name="a", data_type="INT32", address=[1]}'), "4: a: INT32 has 2 registers and not 1."),
     ("telegraf", plugin('{name="a", color="red", address=[1]}'), "4: a: color is not taken over."),
-    ("telegraf", plugin("") + "busy_retries = 3\n", "5: busy_retries: it is an option of the commands: --retries 3."),
+    ("telegraf", plugin("") + 'timeout = "3s"\n', "5: timeout: it is an option of the commands: --timeout 3s."),
     ("sunspec", MODEL.replace('"pad"', '"eui48"'), "6: Pad: the type eui48 has no counterpart: the field is left out."),
     ("sunspec", MODEL.replace('"count": 2', '"count": 0'),
      "13: stage: the device says how often it is there: give that with --count. One is taken."),
