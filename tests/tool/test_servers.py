@@ -237,3 +237,17 @@ def test_a_tls_line_that_fails_says_why(mbm, secured, server, client, more, code
 ])
 def test_a_tls_line_without_its_files_or_its_server_says_why(mbm, line, code, sentence):
     mbm.fails(code, sentence, "read", line.format(*keys("operator")), 100)
+
+
+# What each kind of line can have.
+KEYS = {"tcp": ["accept=unit,transaction", "lenient=yes"], "rtu": ["lenient=yes"], "rtu+tcp": ["lenient=yes"], "ascii": []}
+KEYS_OF_ALL = ["delay=100ms", "message_wait=10ms", "close=round,error", "retries=1", "busy_retries=2", "busy_wait=10ms"]
+
+
+def test_keys_for_devices_that_deviate_cost_a_right_device_nothing(mbm, server):
+    """Each key alone, and all together."""
+    of_kind = KEYS[server.line.split(":")[0]] + KEYS_OF_ALL
+    for keys_of_line in [[key] for key in of_kind if key[:9] != "busy_wait"] + [of_kind]:
+        line = server.line + ("&" if "?" in server.line else "?") + "&".join(keys_of_line)
+        mbm.prints(numbered(100, words(100, 300)), "read", line, "-u", server.unit, 100, 300)
+        assert mbm("write", line, "-u", server.unit, 1, word(1), *PATIENT).code == DONE
