@@ -205,6 +205,21 @@ def test_requests_and_metrics_of_telegraf_are_read(imported, polled):
     assert polled(file) == {"tank level": word(3) ^ 0xFFFF, "tank full": not bit(2), "tank low": wide(1, 2, 3)[1::2].decode("latin-1")}
 
 
+def test_pauses_repetitions_and_the_end_of_connections_are_taken_over(imported, polled):
+    paced = "type: tcp\nhost: here\nport: 502\ndelay: 1\nmessage_wait_milliseconds: 30\nclose_comm_on_error: true\nsensors:\n- {name: a, address: 1}\n"
+    file, said = imported("homeassistant", paced)
+    assert said == "" and head_of(file).endswith("interval: 15s\ndelay: 1s\nmessage_wait: 30ms\nclose: error\n")
+    assert polled(file) == {"a": number(1, sign=True)}
+    file, said = imported("telegraf", PLUGIN + """\
+  [inputs.modbus.workarounds]
+    pause_after_connect = "200ms"
+    pause_between_requests = "0ms"
+    close_connection_after_gather = true
+""".replace("  [inputs", '  busy_retries = 3\n  busy_retries_wait = "50ms"\n  [inputs'))
+    assert said == "" and head_of(file).endswith("interval: 10s\nbusy_retries: 3\nbusy_wait: 50ms\ndelay: 200ms\nclose: round\n")
+    assert polled(file)["motor"] == bool(bit(0))
+
+
 def test_a_model_of_sunspec_is_read_where_it_begins(imported, polled):
     file, said = imported("sunspec", MODEL, "--address", "100", "--unit", "3")
     assert said == ""
