@@ -276,9 +276,18 @@ static int takes_suggestion(const device_field *field, const mbm_planField *plan
     return (component == HOME_SENSOR || component == HOME_NUMBER) && home_is_number(field, planned);
 }
 
+/* The class of a date that is read: a moment or a day. A time of day has none. */
+static const char *date_class(const device_field *field, const mbm_planField *planned)
+{
+    if (!value_is_date(planned->type) || home_component(field, planned) != HOME_SENSOR ||
+        home_is_several(planned) || (field->layout && !strchr(field->layout, 'M')))
+        return NULL;
+    return field->layout && !strchr(field->layout, 'h') ? "date" : "timestamp";
+}
+
 const char *home_class_of(const device_field *field, const mbm_planField *planned)
 {
-    const char *name = NULL;
+    const char *name = date_class(field, planned);
 
     if (field->device_class)
         return strcmp(field->device_class, "none") == 0 ? NULL : field->device_class;

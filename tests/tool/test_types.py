@@ -279,6 +279,8 @@ fields:
   - {name: starts, table: holding, address: 230, type: date, layout: hm, count: 2, access: read-write}
   - {name: serial, table: holding, address: 240, type: text_low_spaces, count: 6, access: read-write}
   - {name: mode, table: holding, address: 250, type: uint32, bits: 12-19}
+  - {name: since, table: holding, address: 250, type: unix32}
+  - {name: day, table: holding, address: 260, type: date, layout: Y M D}
 """)
     for address, registers in ((200, "1 2"), (210, "1 2 3 4"), (220, "6667 6932 3870"), (230, "1 2"), (240, "32 32 32 32 32 32"), (250, "10 20480")):
         plain.prints("", "write", libmodbus.tcp, "-u", 17, "-q", "--multiple", address, *registers.split())
@@ -301,8 +303,11 @@ fields:
         subscriber.expect_result(f"hall/{field}", payload, why)
     subscriber.expect_value("hall/clock", "2027-01-02T00:00:00+01:00")
     assert wait(lambda: any("/clock/config" in topic for topic in subscriber.last))
-    clock = next(json.loads(text) for topic, text in subscriber.last.items() if topic.endswith("/clock/config"))
-    assert "min" not in clock and "unit_of_measurement" not in clock
+    assert wait(lambda: any("/day/config" in topic for topic in subscriber.last))
+    classes = {topic.split("/")[-2]: json.loads(text) for topic, text in subscriber.last.items() if topic.endswith("/config")}
+    assert "min" not in classes["clock"] and "unit_of_measurement" not in classes["clock"]
+    assert [classes[name].get("device_class") for name in ("clock", "since", "day", "starts")] == [None, "timestamp", "date", None]
+    assert "state_class" not in classes["since"]
 
 
 def test_a_library_of_others_packs_the_same_halves(plain):
