@@ -414,8 +414,11 @@ class SerialDevice:
 
 
 class TcpDevice:
-    """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may be away. `mbm serve --fault` plays
+    """Answers requests of Modbus TCP by a function of the PDU; None is no answer. It may be away, close a connection after
+    `idle` seconds without a request, or answer only the first `answers` requests of a connection. `mbm serve --fault` plays
     devices with other manners."""
+
+    idle = answers = None
 
     def __init__(self, answer=lambda pdu: number(42), host="127.0.0.1"):
         self.answer, self.host = answer, host
@@ -463,11 +466,16 @@ class TcpDevice:
         return reply and head[:4] + (len(reply) + 1).to_bytes(2, "big") + head[6:] + reply
 
     def serve(self, peer):
+        answered = 0
         try:
+            peer.settimeout(self.idle)
             stream = peer.makefile("rb")
             while len(head := stream.read(7)) == 7:
                 reply = self.reply(head, stream.read(int.from_bytes(head[4:6], "big") - 1))
-                if reply is not None:
+                if reply is not None and answered != self.answers:
+                    answered += 1
                     peer.sendall(reply)
+        except TimeoutError:
+            peer.shutdown(socket.SHUT_RDWR)
         except OSError:
             pass
