@@ -226,20 +226,18 @@ fn look(w: &World, plan: *mut mbm_plan) {
 
 /// Polls a plan and its client in turns, while time passes.
 fn run(w: &World, plan: *mut mbm_plan, client: *mut mbm_client) {
-    let splits = w.byte() & 1 == 0;
+    let turns = w.byte();
     // A plan has at most nine fields.
-    let blocks = w.null_or(32, || w.block(9 * size_of::<u16>(), 2).cast());
     let splitting = w.put(mbm_planSplitting {
-        blocks,
-        retryMs: w.word().into(),
+        blocks: w.block(9 * size_of::<u16>(), 2).cast(),
+        retryMs: turns.into(),
         triedAt: 0,
         readCount: 0,
         begins: 0,
         state: 0,
     });
-    let splitting = w.null_or(32, || splitting);
-    for _ in 0..1 + w.byte() % 16 {
-        if splits {
+    for _ in 0..1 + turns % 16 {
+        if turns & 0x80 != 0 {
             checked!(w, mbm_plan_pollSplitting(plan, splitting));
         } else {
             checked!(w, mbm_plan_poll(plan));
