@@ -258,7 +258,7 @@ uint8_t mbm_registers_getDate(const mbm_registers *registers, uint16_t address, 
                               const char *layout, uint8_t isBcd, mbm_date *value);
 
 /**
- * Writes a date that mbm_registers_getDate reads. Its flags do not count.
+ * Writes a date, as mbm_registers_getDate reads it. Its flags do not count.
  *
  * @param value    the date
  * @return as mbm_registers_setUint16; MBM_INVALID_ARGUMENT for a date that does not exist;
@@ -274,13 +274,13 @@ uint8_t mbm_registers_setDate(const mbm_registers *registers, uint16_t address, 
  *
  * @param count    how many registers, 3 or 4
  * @param value    receives the date, 2000 to 2127
- * @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a date that does not exist
+ * @return as mbm_registers_getDate
  */
 uint8_t mbm_registers_getIecDate(const mbm_registers *registers, uint16_t address, uint16_t count,
                                  uint8_t order, mbm_date *value);
 
 /**
- * Writes a date that mbm_registers_getIecDate reads, with its flags and no day of the week.
+ * Writes a date, as mbm_registers_getIecDate reads it, with its flags and no day of the week.
  *
  * @param value    the date
  * @return as mbm_registers_setDate
@@ -531,7 +531,7 @@ uint8_t mbm_registers_getBcd(const mbm_registers *registers, uint16_t address, u
                              uint8_t order, uint32_t *value);
 
 /**
- * Writes a number in BCD.
+ * Writes a number in BCD, as mbm_registers_getBcd reads it.
  *
  * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
  */
@@ -550,7 +550,7 @@ uint8_t mbm_registers_getM10k(const mbm_registers *registers, uint16_t address, 
                               uint8_t order, uint64_t *value);
 
 /**
- * Writes such a number.
+ * Writes such a number, as mbm_registers_getM10k reads it.
  *
  * @param value    points to the number
  * @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
@@ -627,7 +627,8 @@ uint8_t mbm_registers_getSignMagnitude(const mbm_registers *registers, uint16_t 
                                        uint16_t count, uint8_t order, int32_t *value);
 
 /**
- * Writes such a number, up to 32767 in one register and 2147483647 in two.
+ * Writes such a number, as mbm_registers_getSignMagnitude reads it: up to 32767 in one register
+ * and 2147483647 in two.
  *
  * @return as mbm_registers_setUint24
  */

@@ -89,7 +89,7 @@ functions! {
         registers.date(&layout_of(layout, isBcd)?, registers.order, address)
     });
 
-    /// Writes a date that mbm_registers_getDate reads. Its flags do not count.
+    /// Writes a date, as mbm_registers_getDate reads it. Its flags do not count.
     ///
     /// @param value    the date
     /// @return as mbm_registers_setUint16; MBM_INVALID_ARGUMENT for a date that does not exist;
@@ -107,13 +107,13 @@ functions! {
     ///
     /// @param count    how many registers, 3 or 4
     /// @param value    receives the date, 2000 to 2127
-    /// @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a date that does not exist
+    /// @return as mbm_registers_getDate
     fn mbm_registers_getIecDate(address: u16, count: u16, order: u8, value: *mut mbm_date)
         = get_value(order, value.cast(), |registers| {
             registers.iec870_date(registers.order, address, count)
         });
 
-    /// Writes a date that mbm_registers_getIecDate reads, with its flags and no day of the week.
+    /// Writes a date, as mbm_registers_getIecDate reads it, with its flags and no day of the week.
     ///
     /// @param value    the date
     /// @return as mbm_registers_setDate

@@ -19,7 +19,7 @@ functions! {
     fn mbm_registers_getBcd(address: u16, count: u16, order: u8, value: *mut u32)
         = get_value(order, value, |registers| registers.bcd(registers.order, address, count));
 
-    /// Writes a number in BCD.
+    /// Writes a number in BCD, as mbm_registers_getBcd reads it.
     ///
     /// @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
     fn mbm_registers_setBcd(address: u16, count: u16, order: u8, value: u32)
@@ -34,7 +34,7 @@ functions! {
     fn mbm_registers_getM10k(address: u16, count: u16, order: u8, value: *mut u64)
         = get_value(order, value, |registers| registers.m10k(registers.order, address, count));
 
-    /// Writes such a number.
+    /// Writes such a number, as mbm_registers_getM10k reads it.
     ///
     /// @param value    points to the number
     /// @return as mbm_registers_setUint16; MBM_OUT_OF_RANGE for a number with more digits
@@ -111,7 +111,8 @@ functions! {
             registers.sign_magnitude(registers.order, address, count)
         });
 
-    /// Writes such a number, up to 32767 in one register and 2147483647 in two.
+    /// Writes such a number, as mbm_registers_getSignMagnitude reads it: up to 32767 in one register
+    /// and 2147483647 in two.
     ///
     /// @return as mbm_registers_setUint24
     fn mbm_registers_setSignMagnitude(address: u16, count: u16, order: u8, value: i32)
