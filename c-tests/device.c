@@ -6,7 +6,7 @@
  *     device serve PORT         serves the values of the device file; PORT 0 takes a free one
  *
  * HEADER is the header in quotes, UPPER and LOWER are the device's name in C. CONVERSIONS is
- * defined if the header has any.
+ * defined if the header has any, and REACH if the device needs something of a client and a link.
  *
  * Licence: MIT OR Apache-2.0. */
 #define JOIN(one, other) one##_##other
@@ -28,6 +28,7 @@ enum {
 
 static mbm_tcp tcp = MBM_INIT;
 static mbm_client client = MBM_INIT;
+static mbm_link kept = MBM_INIT;
 static mbm_plan plan = MBM_INIT;
 static mbm_planPosition positions[FIELDS];
 static mbm_planRead reads[READS];
@@ -112,20 +113,34 @@ static int is_storage_exact(void)
     return mbm_plan_beginGrouped(&other, &client, &less, NAME(LOWER, counts), NULL) != MBM_OK;
 }
 
+/* Sets client and link as the device needs them. Returns a status. */
+static uint8_t configure(void)
+{
+#ifdef REACH
+    const uint8_t status = NAME(LOWER, configure_client)(&client);
+
+    return status == MBM_OK ? NAME(LOWER, configure_link)(&kept) : status;
+#else
+    return MBM_OK;
+#endif
+}
+
 static int poll_device(const char *host, const char *service)
 {
     const mbm_port port = mbm_tcp_port(&tcp);
     const uint32_t begin = port.micros(port.context);
+    const mbm_linkHooks hooks = mbm_tcp_link(&tcp);
     static mbm_tcp_addresses addresses;
     static uint8_t incoming[1024], outgoing[1024];
     uint16_t i, wrong = 0;
 
-    if (mbm_tcp_open(&tcp, &addresses, host, service) != 0) {
+    if (mbm_tcp_openLater(&tcp, &addresses, host, service) != 0) {
         perror(host);
         return 1;
     }
     if (mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing) !=
             MBM_OK ||
+        mbm_link_begin(&kept, &client, &hooks) != MBM_OK || configure() != MBM_OK ||
         !is_storage_exact() ||
         mbm_plan_beginGrouped(&plan, &client, &setup, NAME(LOWER, counts), &wrong) != MBM_OK) {
         fprintf(stderr, "field %u is refused\n", wrong);

@@ -95,8 +95,8 @@ static int fail(void)
     return 0;
 }
 
-/* A name that the header defines, and the line of the file that it comes from; 0 for one that each
- * header has. */
+/* A name that the header defines, and the line of the file that it comes from; 0 for one that is of
+ * no field. */
 typedef struct c_name {
     char *text;
     int line;
@@ -132,7 +132,7 @@ static int store(header *h, char *text, int line)
     if (!other)
         (void)fail();
     else if (other->line == 0)
-        (void)report(CODE_WRONG, "%s:%d: the C name %s is one that each header has: choose another",
+        (void)report(CODE_WRONG, "%s:%d: the C name %s is one of the header itself: choose another",
                      h->path, line, text);
     else
         (void)report(
@@ -200,6 +200,14 @@ static int choose_device(header *h, const char *name)
     return 1;
 }
 
+/* Stores a name that the header has for itself. Returns 0 without memory. */
+static int reserve(header *h, const char *name)
+{
+    char *text;
+
+    return asprintf(&text, "%s_%s", h->upper, name) < 0 ? fail() : store(h, text, 0);
+}
+
 /* Chooses the C names of the device and of its fields. `name` is that of the device, or NULL to
  * take that of the file. Returns 0 after reporting a refusal. */
 static int choose_names(header *h, const char *name)
@@ -213,14 +221,12 @@ static int choose_names(header *h, const char *name)
         return fail();
     if (!choose_device(h, name))
         return 0;
-    for (i = 0; i < sizeof OWN / sizeof OWN[0]; i++) {
-        char *text;
-
-        if (asprintf(&text, "%s_%s", h->upper, OWN[i]) < 0)
-            return fail();
-        if (!store(h, text, 0))
+    for (i = 0; i < sizeof OWN / sizeof OWN[0]; i++)
+        if (!reserve(h, OWN[i]))
             return 0;
-    }
+    for (i = 0; i < REACH_KEYS; i++)
+        if (header_reach_name(h, i) && !reserve(h, header_reach_name(h, i)))
+            return 0;
     for (i = 0; i < h->of->count; i++) {
         const device_field *field = &h->of->fields[i];
 
@@ -433,6 +439,9 @@ static int write_header(job *j, header *h)
     if (h->of->readable > 0)
         fprintf(h->out, " * Define %s_PLAN before you include it for the table of a plan.\n",
                 h->upper);
+    else if (header_has_reach(h))
+        fprintf(h->out, " * Define %s_PLAN before you include it for the functions of a client.\n",
+                h->upper);
     fprintf(
         h->out,
         " * Define %s_SERVER for the tables of a server, and functions that get and set fields. */\n"
@@ -440,6 +449,7 @@ static int write_header(job *j, header *h)
         h->upper, h->upper, h->upper);
     if (!header_write_fields(h) || !header_write_plan(h))
         return 0;
+    header_write_reach(h);
     header_write_types(h);
     if (!header_write_server(h))
         return 0;

@@ -57,15 +57,24 @@ void header_place(const header *h, const mbm_planField *planned);
 /* The C type of a field's value; that of a bit is uint8_t. */
 const char *header_type(const mbm_planField *planned);
 
+/* The same of any number, also of a type that a plan does not know. */
+const char *header_number_type(const mbm_planField *planned);
+
 /* Whether a field has a scale that is a number; whether it has limits of what is written. */
 int header_is_scaled(const device_field *field);
 int header_has_limits(const device_field *field);
+
+/* Writes a number that a file has as a decimal one, after `before`. */
+void header_write_number(FILE *out, const char *before, const value_scale *number);
 
 /* Write the limits of a field in words; and its power of ten and its offset, if it has them:
  * "times 10^(power_sf), plus -40", between `before` and `after`. */
 void header_write_limits(FILE *out, const device_field *field);
 void header_write_meaning(FILE *out, const device_field *field, const char *before,
                           const char *after);
+
+/* Writes the constants of a field's limits. Returns 0 after reporting a refusal. */
+int header_write_limit_constants(header *h, uint16_t at);
 
 /* Writes the conversions of a plan's fields. Returns 0 after reporting a refusal. */
 int header_write_conversions(header *h);
@@ -74,6 +83,14 @@ int header_write_conversions(header *h);
 int header_write_fields(header *h);
 int header_write_plan(header *h);
 int header_write_server(header *h);
+
+/* The name of the constant that a key of the reach becomes, without the device's; NULL if the
+ * device has no such key, or says the default. */
+const char *header_reach_name(const header *h, int key);
+
+/* Writes the constants and functions of the reach; whether there are any. */
+void header_write_reach(const header *h);
+int header_has_reach(const header *h);
 
 /* Whether a field has functions of its own, because a plan does not know its type or order. */
 int header_is_special(const mbm_planField *planned);

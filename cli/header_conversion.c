@@ -41,7 +41,7 @@ static int is_converted(const device_field *field)
 
 /* --- what it is, in words --- */
 
-static void write_number(FILE *out, const char *before, const value_scale *number)
+void header_write_number(FILE *out, const char *before, const value_scale *number)
 {
     static decimal_number decimal;
     char text[DECIMAL_BYTES];
@@ -49,26 +49,6 @@ static void write_number(FILE *out, const char *before, const value_scale *numbe
     decimal_of_scale(number, &decimal);
     decimal_print(&decimal, 0, text);
     fprintf(out, "%s%s", before, text);
-}
-
-void header_write_limits(FILE *out, const device_field *field)
-{
-    const conversion *of = field->conversion;
-
-    if (of->has_least)
-        write_number(out, "at least ", &of->least);
-    if (of->has_most)
-        write_number(out, of->has_least ? ", at most " : "at most ", &of->most);
-    if (of->has_step)
-        write_number(out, of->has_least || of->has_most ? ", in steps of " : "in steps of ",
-                     &of->step);
-}
-
-int header_has_limits(const device_field *field)
-{
-    const conversion *of = field->conversion;
-
-    return of && (of->has_least || of->has_most || of->has_step);
 }
 
 void header_write_meaning(FILE *out, const device_field *field, const char *before,
@@ -81,7 +61,7 @@ void header_write_meaning(FILE *out, const device_field *field, const char *befo
         before = ", ";
     }
     if (has_offset(field))
-        write_number(out, say("%splus ", before), &field->conversion->offset);
+        header_write_number(out, say("%splus ", before), &field->conversion->offset);
     if (field->power_name || has_offset(field))
         fputs(after, out);
 }

@@ -238,7 +238,7 @@ static int write_field(header *h, uint16_t at)
     if (field->conversion && field->conversion->has_precision &&
         !write_macro(h, at, "_PRECISION", field->conversion->precision))
         return 0;
-    return write_labels(h, at);
+    return header_write_limit_constants(h, at) && write_labels(h, at);
 }
 
 int header_write_fields(header *h)

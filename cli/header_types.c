@@ -58,6 +58,11 @@ static const accessor *accessor_of(const mbm_planField *planned)
     return planned->type >= VALUE_DATE_OF_1 ? &DATE : &ACCESSORS[planned->type];
 }
 
+const char *header_number_type(const mbm_planField *planned)
+{
+    return header_is_special(planned) ? accessor_of(planned)->type : header_type(planned);
+}
+
 static int is_date(const mbm_planField *planned)
 {
     return strcmp(accessor_of(planned)->type, "mbm_date") == 0;

@@ -237,22 +237,24 @@ void reach_fit(reach *of, const reach_line *line)
     }
 }
 
-/* When a link closes. A reply with another transaction number may be a late one, unless the
- * connection is a new one. */
-static uint8_t closes(const reach *of)
+/* A reply with another transaction number may be a late one, unless the connection is a new one. */
+uint8_t reach_closes(const reach *of)
 {
     if (!has(of, REACH_CLOSE) && of->accept & MBM_ACCEPT_TRANSACTION)
         return MBM_LINK_CLOSE_AFTER_FAILURE;
     return of->close;
 }
 
+uint32_t reach_busy_wait(const reach *of)
+{
+    return has(of, REACH_BUSY_WAIT) ? of->busy_waitMs : REACH_BUSY_WAIT_MS;
+}
+
 void reach_set(const reach *of, mbm_client *client, mbm_link *link, const reach_line *line,
                uint32_t gapUs)
 {
-    const uint32_t wait = has(of, REACH_BUSY_WAIT) ? of->busy_waitMs : REACH_BUSY_WAIT_MS;
-
     (void)mbm_client_setRetries(client, of->retries);
-    (void)mbm_client_setBusyRetries(client, of->busy_retries, wait);
+    (void)mbm_client_setBusyRetries(client, of->busy_retries, reach_busy_wait(of));
     (void)mbm_client_setAccept(client, line->framing == MBM_FRAMING_TCP ? of->accept : 0);
     (void)mbm_client_setLenient(client, of->is_lenient);
     (void)mbm_client_setMessageWait(client, of->message_waitMs);
@@ -261,5 +263,5 @@ void reach_set(const reach *of, mbm_client *client, mbm_link *link, const reach_
     if (!link)
         return;
     (void)mbm_link_setDelayAfterConnect(link, of->delayMs);
-    (void)mbm_link_setClose(link, closes(of));
+    (void)mbm_link_setClose(link, reach_closes(of));
 }

@@ -60,6 +60,11 @@ int reach_read_nodes(yaml_file *file, const yaml_node_t *const *values, reach *i
 /* Takes from `from` what `into` does not say. */
 void reach_fill(reach *into, const reach *from);
 
+/* When a link closes, MBM_LINK_CLOSE_; and how long to wait before a busy device is asked again,
+ * in milliseconds. */
+uint8_t reach_closes(const reach *of);
+uint32_t reach_busy_wait(const reach *of);
+
 /* What a line can do with it. */
 typedef struct reach_line {
     uint8_t framing;    /* one of MBM_FRAMING_ */

@@ -47,9 +47,11 @@ def header_of(mbm, folder, file, name):
     return header
 
 
-def conversions_of(header, lower):
+def has_of(header, lower):
+    """The options that say what a header has."""
     with open(header) as file:
-        return ["-DCONVERSIONS"] if f"{lower}_conversions" in file.read() else []
+        text = file.read()
+    return [f"-D{word}" for word, part in (("CONVERSIONS", "conversions"), ("REACH", "configure_client")) if f"{lower}_{part}" in text]
 
 
 @pytest.fixture
@@ -57,7 +59,7 @@ def served(mbm, folder, compiled, file, name):
     """A device: the port of mbm serve, the rows of mbm poll, the program that is made with the header, and the header."""
     header, lower = header_of(mbm, folder, file, name), name.lower()
     program = compiled("device", f'-DHEADER="{lower}.h"', f"-DUPPER={name}", f"-DLOWER={lower}", f"-D{name}_PLAN", f"-D{name}_SERVER",
-                       *conversions_of(header, lower))
+                       *has_of(header, lower))
     port = mbm.serve("tcp://127.0.0.1:0", file).rsplit(":", 1)[1]
     return port, polled(mbm, port, file), program, header
 
@@ -173,6 +175,116 @@ def test_the_functions_of_a_header_get_and_set_fields(mbm, folder, compiled):
     assert run(compiled("cells"))[:2] == (0, "")
 
 
+# --- what the device needs to be reached
+
+REACH = "device: Shy\naccept: [unit, transaction]\nlenient: yes\ndelay: 600ms\nmessage_wait: 80ms\nretries: 1\nbusy_retries: 2\nbusy_wait: 10ms\n"
+FAR = "fields:\n" + "".join(f"- {{name: f{i}, table: holding, address: {300 * i}, type: uint16, value: {i + 7}}}\n" for i in range(3))
+SHY = "unit=0 transaction=0 needs-delay=300ms needs-message-wait=50ms exception=6@2 deaf@4".split()
+
+
+def test_a_header_sets_client_and_link_as_the_device_needs_them(mbm, folder, write, compiled):
+    """The device answers as unit 0 with number 0, needs time and pauses, is busy once and silent once."""
+    served = write("served.yaml", FAR)
+    done = {}
+    for name, text in ("SHY", REACH + FAR), ("PLAIN", "device: Plain\n" + FAR):
+        header, lower = header_of(mbm, folder, write(f"{name}.yaml", text), name), name.lower()
+        program = compiled("device", f'-DHEADER="{lower}.h"', f"-DUPPER={name}", f"-DLOWER={lower}", f"-D{name}_PLAN", f"-D{name}_SERVER",
+                           *has_of(header, lower))
+        line = mbm.serve("tcp://127.0.0.1:0", served, *(word for fault in SHY for word in ("--fault", fault)))
+        done[name] = run(program, "poll", "127.0.0.1", line.rsplit(":", 1)[1])
+    assert done["SHY"] == (0, "7\n8\n9\n", ""), done
+    assert done["PLAIN"].code == 0 and not {"7", "8", "9"} & set(done["PLAIN"].out.splitlines()), done
+
+
+@pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
+def test_each_compiler_takes_the_functions_of_the_reach(plain, folder, write, compiler):
+    uses = {"client": "extern mbm_client c;\nuint8_t one(void);\nuint8_t one(void)\n{\n    return LOWER_configure_client(&c);\n}\n",
+            "link": "extern mbm_link l;\nuint8_t two(void);\nuint8_t two(void)\n{\n    return LOWER_configure_link(&l);\n}\n"}
+    for name, head, objects in ("SHY", REACH, "client link"), ("ONE", "device: One\nretries: 2\n", "client"), ("LINK", "device: Link\ndelay: 2s\n", "link"):
+        header_of(plain, folder, write(f"{name}.yaml", head + LIMITED), name)
+        program = write(f"{name}.c", f'#define {name}_PLAN\n#include "{name.lower()}.h"\n#if {name}_A_MIN != -50 || {name}_A_MAX != 300\n'
+                        f"#error limits\n#endif\nfloat f = {name}_F_MAX;\n"
+                        + "".join(uses[word].replace("LOWER", name.lower()) for word in objects.split()))
+        done = run(*compiler, *WARNINGS, f"-I{ROOT}/include", f"-I{folder}", "-Os", "-c", "-o", os.devnull, program)
+        assert done.code == 0, done.error
+
+
+@pytest.mark.parametrize("head, macros, calls", [
+    ("accept: unit\n", {"ACCEPT": "MBM_ACCEPT_UNIT"}, ["client_setAccept(client, HEADER_ACCEPT)"]),
+    ("accept: transaction\n", {"ACCEPT": "MBM_ACCEPT_TRANSACTION", "CLOSE": "MBM_LINK_CLOSE_AFTER_FAILURE"},
+     ["client_setAccept(client, HEADER_ACCEPT)", "link_setClose(link, HEADER_CLOSE)"]),
+    ("accept: transaction\nclose: never\n", {"ACCEPT": "MBM_ACCEPT_TRANSACTION"}, ["client_setAccept(client, HEADER_ACCEPT)"]),
+    ("close: [round, error]\n", {"CLOSE": "(MBM_LINK_CLOSE_WHEN_IDLE | MBM_LINK_CLOSE_AFTER_FAILURE)"}, ["link_setClose(link, HEADER_CLOSE)"]),
+    ("close: round\n", {"CLOSE": "MBM_LINK_CLOSE_WHEN_IDLE"}, ["link_setClose(link, HEADER_CLOSE)"]),
+    ("lenient: yes\n", {"LENIENT": "1u"}, ["client_setLenient(client, HEADER_LENIENT)"]),
+    ("delay: 2s\n", {"DELAY_MS": "2000u"}, ["link_setDelayAfterConnect(link, HEADER_DELAY_MS)"]),
+    ("message_wait_milliseconds: 30\n", {"MESSAGE_WAIT_MS": "30u"}, ["client_setMessageWait(client, HEADER_MESSAGE_WAIT_MS)"]),
+    ("retries: 254\n", {"RETRIES": "254u"}, ["client_setRetries(client, HEADER_RETRIES)"]),
+    ("busy_retries: 3\n", {"BUSY_RETRIES": "3u", "BUSY_WAIT_MS": "100u"},
+     ["client_setBusyRetries(client, HEADER_BUSY_RETRIES, HEADER_BUSY_WAIT_MS)"]),
+    ("busy_retries: 3\nbusy_wait: 0s\n", {"BUSY_RETRIES": "3u", "BUSY_WAIT_MS": "0u"},
+     ["client_setBusyRetries(client, HEADER_BUSY_RETRIES, HEADER_BUSY_WAIT_MS)"]),
+])
+def test_each_key_of_the_reach_is_a_constant_and_a_call(mbm, write, head, macros, calls):
+    out = mbm("header", write("header.yaml", head + HEAD)).out
+    reach = out[out.index("==== Reach"):].split("#endif")[0]
+    assert dict(re.findall(r"^#define HEADER_(\w+) (.*)$", reach, re.M)) == macros
+    assert re.findall(r"mbm_(\w+\(.*\));", reach) == calls
+
+
+def test_a_device_that_needs_nothing_has_the_header_that_it_had(mbm, write):
+    defaults = "retries: 0\nclose: never\ndelay: 0s\nlenient: no\nbusy_retries: 0\nbusy_wait: 5s\n"
+    before = mbm("header", write("header.yaml", HEAD)).out
+    assert "Reach" not in before and mbm("header", write("header.yaml", defaults + HEAD)).out == before
+
+
+def test_a_device_that_is_only_written_has_the_functions_of_the_reach(mbm, write):
+    out = mbm("header", write("header.yaml", "delay: 1s\nfields:\n  - {name: a, table: holding, address: 0, type: uint16, access: write}\n")).out
+    assert "Define HEADER_PLAN before you include it for the functions of a client" in out and "header_configure_link" in out
+
+
+# --- limits of what is written
+
+LIMITED = ("fields:\n- {name: a, table: holding, address: 0, type: int16, scale: 0.1, access: read-write, min_value: -5, max_value: 30, step: 0.5}\n"
+           "- {name: f, table: holding, address: 1, type: float, access: read-write, max_value: 30}\n")
+
+
+@pytest.mark.parametrize("keys, macros", [
+    ("int16, scale: 0.1, min_value: -5, max_value: 30, step: 0.5", {"MIN": "(-50)", "MAX": "300", "STEP": "5"}),
+    # Between two numbers of the registers: the next one that may be written. No multiple of the step is such a number.
+    ("int16, scale: 0.1, min_value: -5.05, max_value: 30.07, step: 0.5", {"MIN": "(-50)", "MAX": "300"}),
+    ("int16, scale: 0.1, max_value: -5.05", {"MAX": "(-51)"}),
+    ("int16, scale: 0.1, step: 0.25", {}),
+    # A negative scale turns them, and an offset is taken off: -5 is 3, and 30 is between -14 and -15.
+    ("int16, scale: -2, offset: 1, min_value: -5, max_value: 30, step: 4", {"MIN": "(-14)", "MAX": "3", "STEP": "2"}),
+    ("int16, offset: 1, step: 4", {}),
+    # Constants are of the sign of the field, and fit where an int has 16 bits.
+    ("uint16, min_value: -5, max_value: 50000, step: 4", {"MIN": "0u", "MAX": "50000u"}),
+    ("uint16, min_value: 0, max_value: 50000, step: 4", {"MIN": "0u", "MAX": "50000u", "STEP": "4u"}),
+    ("uint16, max_value: -5", {}),
+    ("uint32, min_value: 65536, max_value: 4294967295", {"MIN": "65536ul", "MAX": "4294967295ul"}),
+    ("int32, min_value: -32768, max_value: 32768", {"MIN": "(-32768l)", "MAX": "32768l"}),
+    ("int64, min_value: -2147483648, max_value: 1e17", {"MIN": "(-2147483648ll)", "MAX": "100000000000000000ll"}),
+    ("int64, scale: 0.01, max_value: 1e17", {}),
+    ("uint64, scale: 0.01, max_value: 1e17", {"MAX": "10000000000000000000ull"}),
+    ("float, min_value: 0.1, max_value: 30, step: 1e-9", {"MIN": "(0.1f)", "MAX": "(30.0f)", "STEP": "(1e-09f)"}),
+    ("double, scale: 0.1, min_value: -0.1, max_value: 1e17", {"MIN": "(-1.0)", "MAX": "(1e+18)"}),
+    ("bcd16, min_value: 1, max_value: 30", {"MIN": "1u", "MAX": "30u"}),
+    ("int32_m10k, min_value: -100000", {"MIN": "(-100000l)"}),
+    ("float16, min_value: 0.5", {"MIN": "(0.5f)"}),
+])
+def test_limits_are_constants_of_the_numbers_in_the_registers(mbm, write, keys, macros):
+    text = f"fields:\n- {{name: level, table: holding, address: 7, access: read-write, type: {keys}}}\n"
+    code, out, error = mbm("header", write("header.yaml", text))
+    assert (code, dict(re.findall(r"^#define HEADER_LEVEL_(MIN|MAX|STEP) (.*)$", out, re.M))) == (DONE, macros), error
+
+
+def test_limits_with_a_scale_in_another_field_are_no_constants(mbm, write):
+    out = mbm("header", write("header.yaml", "fields:\n- {name: sf, table: holding, address: 0, type: int16}\n- {name: a, table: holding, "
+                              "address: 1, type: int16, scale: sf, access: read-write, max_value: 30}\n")).out
+    assert "at most 30" in out and "_MAX" not in out
+
+
 # --- the command
 
 HEAD = "fields:\n  - name: level\n    table: holding\n    address: 7\n    type: uint16\n"
@@ -181,13 +293,15 @@ OTHER = "  - {name: %s, table: holding, address: 8, type: uint16}\n"
 
 @pytest.mark.parametrize("text, sentence", [
     (HEAD + OTHER % "level address", "FILE:6: the C name HEADER_LEVEL_ADDRESS is that of line 2 too"),
-    (HEAD + OTHER % "fields", "FILE:6: the C name HEADER_FIELDS is one that each header has"),
+    (HEAD + OTHER % "fields", "FILE:6: the C name HEADER_FIELDS is one of the header itself"),
     (HEAD + "    enumeration:\n      1: on\n      2: ON\n", "FILE:8: the C name HEADER_LEVEL_ON is that of line 7 too: choose another."),
     (HEAD + "    enumeration:\n      1: size\n", "FILE:7: the C name HEADER_LEVEL_SIZE is that of line 2 too: choose another."),
     (HEAD + '    enumeration:\n      1: "\u00b0"\n', 'FILE:7: enumeration: the name "\u00b0" has none of the letters'),
     (HEAD + "    access: read\n    scale: 1e-10\n", "FILE:7: scale is not a fraction of two whole numbers up to 2147483647"),
     (HEAD + "    scale: 0.12345678901\n", "FILE:6: scale is not a fraction of two whole numbers"),
     (HEAD + "    scale: 3e9\n", "FILE:6: scale is not a fraction of two whole numbers"),
+    ("retries: 1\n" + HEAD + OTHER % "retries", "FILE:7: the C name HEADER_RETRIES is one of the header itself"),
+    (HEAD + "    access: read-write\n    max_value: 9\n" + OTHER % "level max", "FILE:8: the C name HEADER_LEVEL_MAX is that of line 2 too"),
     ("device: 1 meter\n" + HEAD, 'FILE: "1 meter" cannot be the device\'s name in C'),
     ("device: mbm\n" + HEAD, 'FILE: "mbm" cannot be the device\'s name in C'),
     (HEAD + "    enumeration: {1: on, 1: off}\n", "FILE:6: enumeration has the number 1 twice, first in line 6"),
