@@ -31,13 +31,17 @@ pub struct Date {
     pub flags: u8,
 }
 
-const DAYS_BEFORE_1970: i32 = 719_162;
-const SECONDS_PER_DAY: i64 = 86_400;
+const DAYS_BEFORE_1970: u32 = 719_162;
+const SECONDS_PER_DAY: u32 = 86_400;
+const SECONDS_BEFORE_1970: i64 = DAYS_BEFORE_1970 as i64 * SECONDS_PER_DAY as i64;
+/// A day has so many times 128 seconds. With them, the seconds of 9999 years fit in 32 bits.
+const PARTS_PER_DAY: u32 = 675;
 
 /// The days from 1 January of the year 1 to that of another year.
-const fn days_before(year: i32) -> i32 {
-    let passed = year - 1;
-    365 * passed + passed / 4 - passed / 100 + passed / 400
+const fn days_before(year: u16) -> u32 {
+    let passed = year.wrapping_sub(1);
+    let centuries = passed / 100;
+    365 * passed as u32 + (passed / 4 - centuries + centuries / 4) as u32
 }
 
 /// The days of a month.
@@ -81,13 +85,13 @@ impl Date {
         if !self.exists() || self.is_time_only() {
             return Err(Error::INVALID_ARGUMENT);
         }
-        let mut days = days_before(self.year.into()) + i32::from(self.day) - 1;
+        let mut days = days_before(self.year) + u32::from(self.day) - 1;
         for month in 1..self.month {
-            days += i32::from(days_of(self.year, month));
+            days += u32::from(days_of(self.year, month));
         }
         let of_day =
-            i32::from(self.hour) * 3600 + i32::from(self.minute) * 60 + i32::from(self.second);
-        Ok(i64::from(days - DAYS_BEFORE_1970) * SECONDS_PER_DAY + i64::from(of_day))
+            u32::from(self.hour) * 3600 + u32::from(self.minute) * 60 + u32::from(self.second);
+        Ok((i64::from(days * PARTS_PER_DAY) << 7) + i64::from(of_day) - SECONDS_BEFORE_1970)
     }
 
     /// The date that is so many seconds after 1970-01-01 00:00:00.
@@ -95,23 +99,24 @@ impl Date {
     /// # Errors
     /// [`Error::OUT_OF_RANGE`] for a date before the year 1 or after 9999.
     pub fn of_seconds(seconds: i64) -> Result<Date, Error> {
-        const FIRST: i64 = -(DAYS_BEFORE_1970 as i64) * SECONDS_PER_DAY;
-        const END: i64 = (days_before(10_000) as i64 - DAYS_BEFORE_1970 as i64) * SECONDS_PER_DAY;
+        const FIRST: i64 = -SECONDS_BEFORE_1970;
+        const END: i64 = days_before(10_000) as i64 * SECONDS_PER_DAY as i64 + FIRST;
         if !(FIRST..END).contains(&seconds) {
             return Err(Error::OUT_OF_RANGE);
         }
-        let days = (seconds - FIRST) / SECONDS_PER_DAY;
-        let of_day = (seconds - FIRST - days * SECONDS_PER_DAY) as u32;
-        let mut days = days as i32;
-        // At most one year too many.
-        let mut year = days / 365 + 1;
+        let seconds = seconds - FIRST;
+        let mut days = (seconds >> 7) as u32 / PARTS_PER_DAY;
+        // The higher bits of both terms are equal.
+        let of_day = (seconds as u32).wrapping_sub(days.wrapping_mul(SECONDS_PER_DAY));
+        // At most seven years too many.
+        let mut year = (days / 365 + 1) as u16;
         while days_before(year) > days {
             year -= 1;
         }
         days -= days_before(year);
-        let (year, mut month) = (year as u16, 1);
-        while days >= i32::from(days_of(year, month)) {
-            days -= i32::from(days_of(year, month));
+        let mut month = 1;
+        while days >= u32::from(days_of(year, month)) {
+            days -= u32::from(days_of(year, month));
             month += 1;
         }
         Ok(Date {
@@ -148,7 +153,7 @@ mod tests {
                     let today = date(year, month, day);
                     assert_eq!(today.seconds(), Ok(seconds));
                     assert_eq!(Date::of_seconds(seconds), Ok(today));
-                    seconds += SECONDS_PER_DAY;
+                    seconds += i64::from(SECONDS_PER_DAY);
                     days += 1;
                 }
             }

@@ -1,6 +1,7 @@
 //! Decimal digits in registers: BCD, with four digits in a register as four bits each, and
 //! Schneider's modulo 10000 (M10K, Mod10), with four digits in a register as one number.
 
+use super::arithmetic::{divide_small, times_small};
 use crate::error::Error;
 
 /// The number of 8 digits of BCD.
@@ -36,22 +37,31 @@ pub fn to_bcd(number: u32, digits: u32) -> Result<u32, Error> {
 }
 
 /// The most that a register of modulo 10000 holds, and one more.
-const M10K: u64 = 10_000;
+const M10K: u16 = 10_000;
 
 /// The number of `count` registers of modulo 10000, each 0 to 9999.
 ///
 /// # Errors
 /// [`Error::MALFORMED_VALUE`] for a register above 9999.
 pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
-    let mut number = 0;
-    for nth in (0..count).rev() {
-        let part = raw >> (16 * nth) & 0xFFFF;
+    let (mut number, mut left) = (0, highest_first(raw, count));
+    for _ in 0..count {
+        let part = (left >> 48) as u16;
+        left <<= 16;
         if part >= M10K {
             return Err(Error::MALFORMED_VALUE);
         }
-        number = number * M10K + part;
+        number = times_small(number, M10K).0 + u64::from(part);
     }
     Ok(number)
+}
+
+/// `count` registers as the highest ones of four.
+fn highest_first(mut raw: u64, count: u16) -> u64 {
+    for _ in count..4 {
+        raw <<= 16;
+    }
+    raw
 }
 
 /// The number of `count` registers of modulo 10000, each -9999 to 9999 in two's complement.
@@ -59,15 +69,18 @@ pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
 /// # Errors
 /// [`Error::MALFORMED_VALUE`] for a register beyond that.
 pub fn from_signed_m10k(raw: u64, count: u16) -> Result<i64, Error> {
-    let mut number = 0;
-    for nth in (0..count).rev() {
-        let part = i64::from((raw >> (16 * nth)) as i16);
+    let (mut number, mut left) = (0u64, highest_first(raw, count));
+    for _ in 0..count {
+        let part = ((left >> 48) as u16).cast_signed();
+        left <<= 16;
         if part.unsigned_abs() >= M10K {
             return Err(Error::MALFORMED_VALUE);
         }
-        number = number * M10K as i64 + part;
+        // In two's complement.
+        number = times_small(number, M10K).0;
+        number = number.wrapping_add(i64::from(part).cast_unsigned());
     }
-    Ok(number)
+    Ok(number.cast_signed())
 }
 
 /// A number in `count` registers of modulo 10000.
@@ -75,15 +88,23 @@ pub fn from_signed_m10k(raw: u64, count: u16) -> Result<i64, Error> {
 /// # Errors
 /// [`Error::OUT_OF_RANGE`] for a number with more than four digits for each register.
 pub fn to_m10k(number: u64, count: u16) -> Result<u64, Error> {
-    let (mut left, mut raw) = (number, 0);
-    for nth in 0..count {
-        raw |= (left % M10K) << (16 * nth);
-        left /= M10K;
+    let (mut left, mut words) = (number, [0; 4]);
+    for word in words.iter_mut().take(count.into()) {
+        (left, *word) = divide_small(left, M10K);
     }
     if left > 0 {
         return Err(Error::OUT_OF_RANGE);
     }
-    Ok(raw)
+    Ok(joined(words))
+}
+
+/// Four registers, the lowest first, as one number.
+fn joined(words: [u16; 4]) -> u64 {
+    let mut raw = 0;
+    for word in words.iter().rev() {
+        raw = raw << 16 | u64::from(*word);
+    }
+    raw
 }
 
 /// As [`to_m10k`], for a number with a sign, which each register has that is not 0.
@@ -95,12 +116,12 @@ pub fn to_signed_m10k(number: i64, count: u16) -> Result<u64, Error> {
     if number >= 0 {
         return Ok(raw);
     }
-    let mut negative = 0;
-    for nth in 0..count {
-        let part = (raw >> (16 * nth)) as u16;
-        negative |= u64::from(part.wrapping_neg()) << (16 * nth);
+    let (mut left, mut words) = (raw, [0; 4]);
+    for word in &mut words {
+        *word = (left as u16).wrapping_neg();
+        left >>= 16;
     }
-    Ok(negative)
+    Ok(joined(words))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Conversion between words and bits in the caller's memory and data bytes on the wire.
 
+#[doc(hidden)]
+pub mod arithmetic;
 pub mod bits;
 pub mod clock;
 pub mod date;

@@ -1,6 +1,7 @@
 //! The bits of one to four registers as a number, in any order: what the types of [`super::types`]
 //! are made of.
 
+use super::arithmetic::{shifted_left, shifted_right};
 use super::order::Order;
 use super::view::{RegisterBytes, RegisterBytesMut, Registers};
 use crate::error::Error;
@@ -40,7 +41,10 @@ impl<C: RegisterBytes> Registers<C> {
         bits: u8,
     ) -> Result<u64, Error> {
         let mask = mask_of(count, first, bits)?;
-        Ok((self.raw(order, address, count)? & mask) >> first)
+        Ok(shifted_right(
+            self.raw(order, address, count)? & mask,
+            first,
+        ))
     }
 }
 
@@ -59,10 +63,14 @@ impl<C: RegisterBytesMut> Registers<C> {
     ) -> Result<(), Error> {
         // Finds every reason to refuse it.
         let _ = self.raw(order, address, count)?;
-        if count < 4 && raw >> (16 * count) != 0 {
+        let mut left = raw;
+        for _ in 0..count {
+            left >>= 16;
+        }
+        if left != 0 {
             return Err(Error::OUT_OF_RANGE);
         }
-        let mut left = raw;
+        left = raw;
         for nth in (0..count).rev() {
             let place = order.place(nth, count).ok_or(Error::INVALID_ARGUMENT)?;
             self.set_in(order, address.wrapping_add(place), left as u16)?;
@@ -86,11 +94,12 @@ impl<C: RegisterBytesMut> Registers<C> {
         number: u64,
     ) -> Result<(), Error> {
         let mask = mask_of(count, first, bits)?;
-        if number > mask >> first {
+        if number > shifted_right(mask, first) {
             return Err(Error::OUT_OF_RANGE);
         }
         let others = self.raw(order, address, count)? & !mask;
-        self.set_raw(order, address, count, others | number << first)
+        let raw = others | shifted_left(number, first);
+        self.set_raw(order, address, count, raw)
     }
 }
 
@@ -100,5 +109,5 @@ fn mask_of(count: u16, first: u8, bits: u8) -> Result<u64, Error> {
     if bits == 0 || end > 64 || end > count.saturating_mul(16) {
         return Err(Error::INVALID_ARGUMENT);
     }
-    Ok(u64::MAX >> (64 - bits) << first)
+    Ok(shifted_left(shifted_right(u64::MAX, 64 - bits), first))
 }

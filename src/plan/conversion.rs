@@ -5,7 +5,8 @@
 
 use super::field::{Field, DOUBLE, FLOAT, INT32, TEXT};
 use super::value::{scale, Words};
-use super::wide::{times_small, Wide};
+use super::wide::Wide;
+use crate::data::arithmetic::times_small;
 use crate::error::Error;
 
 /// The greatest power of ten, and the least without its sign: those of SunSpec.
@@ -44,13 +45,18 @@ pub fn power(words: &Words) -> Result<i8, Error> {
     Ok(if is_below { -power } else { power })
 }
 
-/// The bits that SunSpec reserves in a type of integers for "not available". `bits` is how many
-/// it has.
-const fn reserved(field: &Field, bits: u32) -> u64 {
+/// The bits that SunSpec reserves in a type of integers for "not available": in two's complement
+/// the least number, else the greatest.
+fn reserved(field: &Field) -> u64 {
+    let (mut highest, mut greatest) = (1 << 15, 0xFFFF);
+    for _ in 1..1 << field.value_shift() {
+        highest <<= 16;
+        greatest = greatest << 16 | 0xFFFF;
+    }
     if field.is_signed() {
-        1 << (bits - 1)
+        highest
     } else {
-        u64::MAX >> (u64::BITS - bits)
+        greatest
     }
 }
 
@@ -68,20 +74,12 @@ impl Words<'_> {
             conversion.is_standard && words.is_some_and(|words| words.iter().all(|word| *word == 0))
         } else {
             let raw = self.raw();
-            let infinity = if field.value_type == FLOAT {
-                0xFF << 23
-            } else {
-                0x7FF << 52
-            };
-            let sign = if field.value_type == FLOAT { 31 } else { 63 };
             match field.value_type {
-                FLOAT | DOUBLE if raw & !(1 << sign) > infinity => true,
+                FLOAT if raw & 0x7FFF_FFFF > 0xFF << 23 => true,
+                DOUBLE if raw & 0x7FFF_FFFF_FFFF_FFFF > 0x7FF << 52 => true,
                 _ => {
-                    let shift = field.value_shift();
-                    conversion.is_standard
-                        && field.is_integer()
-                        && raw == reserved(field, 16 << shift)
-                        || is_listed(conversion.not_available, raw, 1 << shift)
+                    conversion.is_standard && field.is_integer() && raw == reserved(field)
+                        || is_listed(conversion.not_available, raw, 1 << field.value_shift())
                 }
             }
         };

@@ -1,15 +1,65 @@
 //! A number with so many bits that a sum of two is rounded only once when it becomes a float. It is
 //! computed with integers, for not every processor has arithmetic on floats.
 
+use crate::data::arithmetic::times_small;
+
 /// The bits of a significand. Its sum with another one fits in 128 bits.
 const BITS: u32 = 124;
+
+/// An integer of 128 bits. It is shifted by one place at a time: the compiler would call functions
+/// to shift it by any number, or make code that fits in no register of a small processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Long {
+    high: u64,
+    low: u64,
+}
+
+impl Long {
+    const ZERO: Long = Long { high: 0, low: 0 };
+
+    fn is_zero(&self) -> bool {
+        *self == Long::ZERO
+    }
+
+    /// True if it has [`BITS`] bits or more.
+    fn is_full(&self) -> bool {
+        self.high >> (BITS - 1 - u64::BITS) != 0
+    }
+
+    fn double(&mut self) {
+        self.high = self.high << 1 | self.low >> 63;
+        self.low <<= 1;
+    }
+
+    /// Shifts to the right. The lowest bit is 1 too if a bit that is 1 goes out.
+    fn shift_right(&mut self, places: u32) {
+        // After 128 places only that bit is left.
+        for _ in 0..places.min(u128::BITS) {
+            self.low = self.low >> 1 | self.high << 63 | self.low & 1;
+            self.high >>= 1;
+        }
+    }
+
+    fn add(&mut self, other: Long) {
+        let (low, is_over) = self.low.overflowing_add(other.low);
+        self.low = low;
+        self.high += other.high + u64::from(is_over);
+    }
+
+    /// Subtracts what is not more.
+    fn subtract(&mut self, other: Long) {
+        let (low, is_under) = self.low.overflowing_sub(other.low);
+        self.low = low;
+        self.high -= other.high + u64::from(is_under);
+    }
+}
 
 /// significand * 2^exponent. The significand is 0 or has [`BITS`] bits; the lowest of these is 1
 /// too if the exact number has more bits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wide {
     pub(super) is_below: bool,
-    significand: u128,
+    significand: Long,
     pub(super) exponent: i32,
 }
 
@@ -27,70 +77,76 @@ impl Wide {
             };
             (*factor, _) = times_small(*factor, 5);
         }
-        let mut product = 0u128;
+        let number = Long {
+            high: 0,
+            low: number,
+        };
+        let mut product = Long::ZERO;
         for _ in 0..u64::BITS {
-            product <<= 1;
+            product.double();
             if multiplier >> 63 != 0 {
-                product += u128::from(number);
+                product.add(number);
             }
             multiplier <<= 1;
         }
         let mut wide = Wide {
             is_below: false,
-            significand: 0,
+            significand: Long::ZERO,
             exponent: i32::from(power) + u128::BITS as i32,
         };
-        if product == 0 {
+        if product.is_zero() {
             return wide;
         }
         let mut rest = 0u64;
-        while wide.significand >> (BITS - 1) == 0 {
-            rest = rest << 1 | (product >> 127) as u64;
-            product <<= 1;
-            wide.significand <<= 1;
+        while !wide.significand.is_full() {
+            rest = rest << 1 | product.high >> 63;
+            product.double();
+            wide.significand.double();
             if rest >= divisor {
                 rest -= divisor;
-                wide.significand |= 1;
+                wide.significand.low |= 1;
             }
             wide.exponent -= 1;
         }
-        wide.significand |= u128::from(rest != 0 || product != 0);
+        wide.significand.low |= u64::from(rest != 0 || !product.is_zero());
         wide
     }
 
     /// The sum of two numbers.
     pub(super) fn plus(self, other: Wide) -> Wide {
-        if other.significand == 0 {
+        if other.significand.is_zero() {
             return self;
         }
-        if self.significand == 0 {
+        if self.significand.is_zero() {
             return other;
         }
-        let (large, small) = if self.exponent < other.exponent {
+        let (mut sum, mut small) = if self.exponent < other.exponent {
             (other, self)
         } else {
             (self, other)
         };
-        let less = shifted(small.significand, (large.exponent - small.exponent) as u32);
-        let mut sum = large;
-        if large.is_below == small.is_below {
-            sum.significand += less;
-        } else if large.significand >= less {
-            sum.significand -= less;
+        small
+            .significand
+            .shift_right((sum.exponent - small.exponent) as u32);
+        if sum.is_below == small.is_below {
+            sum.significand.add(small.significand);
         } else {
-            sum.significand = less - large.significand;
-            sum.is_below = small.is_below;
+            if sum.significand < small.significand {
+                (sum.significand, small.significand) = (small.significand, sum.significand);
+                sum.is_below = small.is_below;
+            }
+            sum.significand.subtract(small.significand);
         }
-        if sum.significand == 0 {
+        if sum.significand.is_zero() {
             sum.is_below = false;
             return sum;
         }
-        if sum.significand >> BITS != 0 {
-            sum.significand = shifted(sum.significand, 1);
+        if sum.significand.high >> (BITS - u64::BITS) != 0 {
+            sum.significand.shift_right(1);
             sum.exponent += 1;
         }
-        while sum.significand >> (BITS - 1) == 0 {
-            sum.significand <<= 1;
+        while !sum.significand.is_full() {
+            sum.significand.double();
             sum.exponent -= 1;
         }
         sum
@@ -98,49 +154,31 @@ impl Wide {
 
     /// The bits of the nearest float of 64 bits; if two are equally near, of the even one.
     pub(super) fn to_bits(self) -> u64 {
-        /// The bits that a float has no place for.
-        const SUPERFLUOUS: u32 = BITS - 53;
+        /// The bits of the high half that a float has no place for, beside the low half.
+        const SUPERFLUOUS: u32 = BITS - 53 - u64::BITS;
+        const HALF: Long = Long {
+            high: 1 << (SUPERFLUOUS - 1),
+            low: 0,
+        };
         let sign = u64::from(self.is_below) << 63;
-        if self.significand == 0 {
+        let mut significand = self.significand;
+        if significand.is_zero() {
             return sign;
         }
         let mut exponent = self.exponent + (BITS as i32 - 1) + 1023;
-        let mut significand = self.significand;
         if exponent >= 0x7FF {
             return sign | 0x7FF << 52;
         }
         if exponent < 1 {
-            significand = shifted(significand, (1 - exponent) as u32);
+            significand.shift_right((1 - exponent) as u32);
             exponent = 1;
         }
-        let rest = significand << (u128::BITS - SUPERFLUOUS);
-        let mut bits = (significand >> SUPERFLUOUS) as u64;
-        if rest > 1 << 127 || rest == 1 << 127 && bits & 1 != 0 {
+        let mut bits = significand.high >> SUPERFLUOUS;
+        significand.high &= (1 << SUPERFLUOUS) - 1;
+        if significand > HALF || significand == HALF && bits & 1 != 0 {
             bits += 1;
         }
         // The highest bit of the significand adds 1 to the exponent.
         sign | (bits + (((exponent - 1) as u64) << 52))
     }
-}
-
-/// Shifts to the right. The lowest bit is 1 too if a bit that is 1 goes out.
-fn shifted(significand: u128, places: u32) -> u128 {
-    if places >= u128::BITS {
-        return 1;
-    }
-    let kept = significand >> places;
-    kept | u128::from(kept << places != significand)
-}
-
-/// A product, and what of it goes beyond 64 bits. (An AVR has no other use for a multiplication of
-/// 64 bits, which shifts and sums of this number would become.)
-pub(super) fn times_small(mut number: u64, factor: u16) -> (u64, u16) {
-    let (mut product, mut carry) = (0u64, 0u32);
-    for _ in 0..u64::BITS / u16::BITS {
-        carry += u32::from(number as u16) * u32::from(factor);
-        number >>= 16;
-        product = product >> 16 | u64::from(carry as u16) << 48;
-        carry >>= 16;
-    }
-    (product, carry as u16)
 }
