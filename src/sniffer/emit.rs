@@ -33,6 +33,8 @@ impl Sniffer {
     }
 
     /// Turns a step into an event, and moves the stream past it.
+    // In line, the frame of the function that calls it is too large for LLVM.
+    #[cfg_attr(target_arch = "xtensa", inline(never))]
     pub(super) fn emit_event<'b>(
         &mut self,
         buffer: &'b mut [u8],
