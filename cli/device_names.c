@@ -27,6 +27,11 @@ static int make_one(yaml_file *file, device_field *field)
     return 1;
 }
 
+/* A field in an order of their names. */
+typedef struct named {
+    const device_field *field;
+} named;
+
 /* Orders fields by topic or identifier, then by line. */
 static int compare_lines(const device_field *one, const device_field *other)
 {
@@ -35,8 +40,8 @@ static int compare_lines(const device_field *one, const device_field *other)
 
 static int compare_topics(const void *one, const void *other)
 {
-    const device_field *a = *(const device_field *const *)one;
-    const device_field *b = *(const device_field *const *)other;
+    const device_field *a = ((const named *)one)->field;
+    const device_field *b = ((const named *)other)->field;
     const int order = strcmp(a->topic, b->topic);
 
     return order != 0 ? order : compare_lines(a, b);
@@ -44,8 +49,8 @@ static int compare_topics(const void *one, const void *other)
 
 static int compare_identifiers(const void *one, const void *other)
 {
-    const device_field *a = *(const device_field *const *)one;
-    const device_field *b = *(const device_field *const *)other;
+    const device_field *a = ((const named *)one)->field;
+    const device_field *b = ((const named *)other)->field;
     const int order = strcmp(a->identifier, b->identifier);
 
     return order != 0 ? order : compare_lines(a, b);
@@ -60,35 +65,37 @@ static int refuse_same(yaml_file *file, const device_field *first, const device_
                                  second->name, first->line, first->name, what, text);
 }
 
-static int check_all(yaml_file *file, const device_field **sorted, uint16_t count)
+static int check_all(yaml_file *file, named *sorted, uint16_t count)
 {
     uint16_t i;
 
     qsort(sorted, count, sizeof *sorted, compare_topics);
     for (i = 1; i < count; i++)
-        if (strcmp(sorted[i - 1]->topic, sorted[i]->topic) == 0)
-            return refuse_same(file, sorted[i - 1], sorted[i], sorted[i]->topic, "topic");
+        if (strcmp(sorted[i - 1].field->topic, sorted[i].field->topic) == 0)
+            return refuse_same(file, sorted[i - 1].field, sorted[i].field, sorted[i].field->topic,
+                               "topic");
     qsort(sorted, count, sizeof *sorted, compare_identifiers);
     for (i = 1; i < count; i++)
-        if (strcmp(sorted[i - 1]->identifier, sorted[i]->identifier) == 0)
-            return refuse_same(file, sorted[i - 1], sorted[i], sorted[i]->identifier, "identifier");
+        if (strcmp(sorted[i - 1].field->identifier, sorted[i].field->identifier) == 0)
+            return refuse_same(file, sorted[i - 1].field, sorted[i].field,
+                               sorted[i].field->identifier, "identifier");
     return 1;
 }
 
 int device_names_make(yaml_file *file, device *of)
 {
-    const device_field **sorted;
+    named *sorted;
     uint16_t i;
     int is_right;
 
     for (i = 0; i < of->count; i++)
         if (!make_one(file, &of->fields[i]))
             return 0;
-    sorted = (const device_field **)calloc(of->count, sizeof *sorted);
+    sorted = (named *)calloc(of->count + 1u, sizeof *sorted);
     if (!sorted)
         return yaml_file_fail(file, ENOMEM);
     for (i = 0; i < of->count; i++)
-        sorted[i] = &of->fields[i];
+        sorted[i].field = &of->fields[i];
     is_right = check_all(file, sorted, of->count);
     free(sorted);
     return is_right;

@@ -46,9 +46,9 @@ void import_lose(import *j, int line, const char *what, const char *why, ...)
 /* Names each key of a map that nothing has looked up. `of` says of what: "sensor Voltage". */
 void import_lose_rest(import *j, const tree *map, const char *of);
 
-/* Begins a field. Its name becomes one that no field before has, by the rule of names. Returns its
- * index. */
-unsigned import_field(import *j, int line, const char *name);
+/* Begins a field. Its name is `text`, changed so that it obeys the rule of names and no field
+ * before has it. Returns its index. */
+unsigned import_field(import *j, int line, const char *text);
 
 /* The name of a field as it is in the file. */
 const char *import_name(const import *j, unsigned field);

@@ -224,19 +224,20 @@ typedef struct place_in_file {
 
 typedef struct draft {
     FILE *out;
-    place_in_file *places; /* of each line, from 1 on */
+    place_in_file *places; /* of each line */
     size_t lines, capacity;
 } draft;
 
 static void add_line(draft *d, unsigned part, unsigned pair)
 {
-    if (d->lines + 1 >= d->capacity) {
+    if (d->lines == d->capacity) {
         d->capacity = d->capacity ? 2 * d->capacity : 256;
         d->places = (place_in_file *)realloc(d->places, d->capacity * sizeof *d->places);
         if (!d->places)
             exit(report(CODE_SYSTEM, REPORT_NO_MEMORY));
+        memset(&d->places[d->lines], 0, (d->capacity - d->lines) * sizeof *d->places);
     }
-    d->places[++d->lines] = (place_in_file){part, pair};
+    d->places[d->lines++] = (place_in_file){part, pair};
 }
 
 static void write_draft(const import *j, draft *d)
@@ -311,7 +312,7 @@ static int take_out(import *j, const draft *d, const char *wrong)
 
     if (at == 0 || at > d->lines || !why)
         return 0;
-    place = &d->places[at];
+    place = &d->places[at - 1];
     part = part_of(j, place->part);
     if (place->pair >= part->count)
         return 0;
