@@ -179,6 +179,73 @@ SIM_TEST(a_line_that_never_falls_silent_is_busy)
     assert_in_range(s->now, 100000, 110000);
 }
 
+/* Lets the frames of `text` arrive from time `at` on, `count` times, each time `period`
+ * microseconds after the last one; without a pause if `period` is 0. */
+static void repeat(sim *s, uint64_t at, const char *text, unsigned count, uint32_t period)
+{
+    uint8_t bytes[64];
+    size_t length = sim_bytes(bytes, text);
+
+    for (unsigned i = 0; i < count; i++) {
+        sim_deliver(s, at, bytes, length);
+        at += period ? period : length * s->character;
+    }
+}
+
+/* None of them answers the request, which was not sent. */
+SIM_TEST(a_device_that_never_stops_repeating_the_right_reply_makes_the_line_busy)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->limit = 1000000;
+    repeat(s, 0, "11 03 02 00 2A +", 1000, 0);
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(s->sent, 0);
+    assert_in_range(s->now, 100000, 300000);
+}
+
+/* Each right reply makes the request wait for the quiet time, and the frame after it for the gap
+ * again. */
+SIM_TEST(a_device_that_never_stops_sending_different_replies_makes_the_line_busy)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->limit = 1000000;
+    repeat(s, 0, "11 03 02 00 2A +/11 03 04 00 2A 00 2B +", 480, 0);
+    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
+    assert_int_equal(s->sent, 0);
+    assert_in_range(s->now, 100000, 300000);
+}
+
+/* The late reply ends the quiet time, which is longer than the response timeout here. */
+SIM_TEST(a_late_reply_in_a_long_quiet_time_does_not_make_the_line_busy)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    OK(mbm_line_setQuietTime(&s->line, 500));
+    assert_int_equal(sim_read_one(s), MBM_RESPONSE_TIMED_OUT);
+    sim_deliver_text(s, s->now + 300000, "11 03 02 00 2A +");
+    sim_answer(s, 1, 500, "11 03 02 00 2B +");
+    OK(sim_read_one(s));
+    assert_int_equal(s->response[0], 43);
+    assert_int_equal(s->sent, 2);
+}
+
+/* The first reply of each pair is the one that the unit owes. The second one is owed to nobody, so
+ * the request does not wait for the unit again. */
+SIM_TEST(a_device_that_sends_each_reply_twice_does_not_keep_a_request_from_being_sent)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    OK(mbm_node_setBlocking(n, 0));
+    assert_int_equal(sim_read_one(s), MBM_PENDING);
+    while (s->sent == 0 || s->driver_on)
+        assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+    OK(mbm_node_cancel(n));
+    OK(mbm_node_setBlocking(n, 1));
+    repeat(s, s->now + 10000, "11 03 02 00 2A +/11 03 02 00 2A +", 20, 150000);
+    s->limit = 2000000;
+    OK(sim_read_one(s));
+    assert_int_equal(s->sent, 2);
+    assert_in_range(s->now, 0, 500000);
+}
+
 SIM_TEST(a_flood_is_bounded_even_if_every_read_returns_bytes)
 {
     static const uint8_t noise[8000] = {0};

@@ -72,10 +72,8 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.is_late = true;
         self.add_owed_reply(is_cancelled);
         let has_heard_unit = self.is_held || self.seen > Finding::OTHER_UNIT;
-        if has_heard_unit {
-            self.begun = self.now;
-        }
-        self.write_record();
+        // The wait of a request that was not sent goes on, so its begin stays.
+        self.write_record(if has_heard_unit { self.now } else { self.begun });
     }
 
     /// Counts the pending request among those whose reply the unit owes.
@@ -94,9 +92,9 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// Writes into the record of the unit how many replies it owes, and when it is clean at the
-    /// latest.
+    /// latest, if it is silent since the time `since`.
     #[inline(always)]
-    fn write_record(&mut self) {
+    fn write_record(&mut self, since: u32) {
         let place = self.find_record_place();
         let timeout = Q::response_timeout(self);
         let silence = timeout
@@ -109,7 +107,7 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
             self.owed = ANY;
         }
         // An earlier request may have had a longer timeout.
-        record.clean_after(silence, self.begun);
+        record.clean_after(silence, since);
         record.unit = self.unit;
         record.owed = self.owed;
     }

@@ -273,17 +273,17 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
                 // The search may have taken long. The silence begins after it.
                 self.note_use();
             }
+            if self.phase == Phase::Rest {
+                // The request has waited for its unit. The line was not busy.
+                self.begun = self.now;
+            }
+            // Received bytes extend the wait, but not for ever. They may also end the quiet time,
+            // which counts until now.
+            is_old = self.is_overdue(self.begun);
             if is_before {
-                let silence = self.line_silence();
-                if self.wait > silence {
-                    // The request has waited for its unit. The line was not busy.
-                    self.begun = self.now;
-                }
-                self.wait = silence;
+                self.wait = self.line_silence();
                 self.phase = Phase::Gap;
             }
-            // Received bytes extend the wait, but not for ever.
-            is_old = self.is_overdue(self.begun);
         }
         let is_over = !self.has_more && self.has_expired();
         if self.phase <= Phase::Gap {
@@ -469,16 +469,16 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// A right reply has arrived before the request was sent. It belongs to an earlier request. If
-    /// the unit owes none, more late replies may come.
+    /// the unit owes none, more late replies may come. None of them is that of a cancelled request.
     #[cold]
     pub(super) fn note_unexpected(&mut self) {
         if self.owes() {
             self.note_reply_of(self.unit);
         } else {
+            self.owed = 0;
             self.expect_late_reply(false);
         }
         self.begin_search();
-        self.wait = self.line_silence();
     }
 
     /// Sends the request, now that the line is silent, unless its unit is not clean yet.
