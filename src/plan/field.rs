@@ -85,7 +85,7 @@ impl Field {
     /// a unit above 255, an interval out of range, a negative divisor, or a scale of a text or of
     /// [`REGISTERS`]; [`Status::BROADCAST_NOT_ALLOWED`] for unit 0, unless `has_unit_0` is 1, as it is
     /// in TCP frames; [`Status::ILLEGAL_DATA_ADDRESS`] if the field goes beyond address 65535.
-    pub fn check(&self, has_unit_0: u16) -> Status {
+    pub fn check(&self, has_unit_0: u8) -> Status {
         let known = self.table.wrapping_sub(1) < INPUT_REGISTERS
             && self.value_type.wrapping_sub(1) < REGISTERS
             && (self.value_type == BIT || !self.is_in_bits())
@@ -97,7 +97,7 @@ impl Field {
             && self.interval_ms.wrapping_sub(1) < LONGEST_INTERVAL_MS;
         if !known {
             Status::INVALID_ARGUMENT
-        } else if self.unit | has_unit_0 == 0 {
+        } else if self.unit as u8 | has_unit_0 == 0 {
             Status::BROADCAST_NOT_ALLOWED
         } else if self.end() > 0x1_0000 {
             Status::ILLEGAL_DATA_ADDRESS

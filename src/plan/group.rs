@@ -31,7 +31,7 @@ pub const MAX_FIELDS: usize = 16_383;
 /// excluded range whose last address is less than its first.
 pub fn group<L: ReadLimits>(
     fields: &[Field],
-    has_unit_0: u16,
+    has_unit_0: u8,
     limits: &L,
     positions: &mut [Position],
     reads: &mut [Read],
@@ -78,7 +78,7 @@ pub fn group<L: ReadLimits>(
 /// [`Status::BUFFER_TOO_SMALL`] without a field at fault for fewer `reads` than counts.
 pub fn take_groups(
     fields: &[Field],
-    has_unit_0: u16,
+    has_unit_0: u8,
     counts: &[u16],
     positions: &mut [Position],
     reads: &mut [Read],

@@ -56,7 +56,7 @@ pub trait ReadLimits {
 
     /// As [`Field::check`]; [`Status::ILLEGAL_DATA_ADDRESS`] also if the field goes into an excluded
     /// range; [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
-    fn check(&self, field: &Field, has_unit_0: u16) -> Status {
+    fn check(&self, field: &Field, has_unit_0: u8) -> Status {
         let status = field.check(has_unit_0);
         if status != Status::OK {
             status

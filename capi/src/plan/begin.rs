@@ -107,7 +107,7 @@ unsafe fn begin(
     setup: *const mbm_planSetup,
     field: *mut u16,
     is_usable: bool,
-    group: impl FnOnce(&mbm_planSetup, u16, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+    group: impl FnOnce(&mbm_planSetup, u8, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
 ) -> u8 {
     let mut wrong = u16::MAX;
     // `field` is NULL or what the header says.
@@ -126,7 +126,7 @@ unsafe fn attempt(
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
     is_usable: bool,
-    group: impl FnOnce(&mbm_planSetup, u16, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
+    group: impl FnOnce(&mbm_planSetup, u8, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
     wrong: &mut u16,
 ) -> Status {
     // Nothing uses the storage of a plan that is not begun.
@@ -150,7 +150,7 @@ unsafe fn attempt(
     let positions = from_raw_parts_mut(given.positions.cast(), count);
     let reads = from_raw_parts_mut(given.reads.cast(), given.readCount.into());
     // In TCP frames unit 0 is a unit.
-    let has_unit_0 = u16::from(queue(pointers::object(client)).has_transaction_ids);
+    let has_unit_0 = u8::from(queue(pointers::object(client)).has_transaction_ids);
     let count = match group(given, has_unit_0, positions, reads) {
         Ok(count) => count as u16,
         Err(refusal) => {
