@@ -11,21 +11,32 @@ const LAST: u8 = MBM_MALFORMED_VALUE;
 /// Calls a function of the C API. Its first argument, or `$object`, is marked as in use during the
 /// call.
 macro_rules! call {
-    ($w:expr, $name:ident($first:expr $(, $more:expr)* $(,)?)) => {
-        call!($w, $first, $name($first $(, $more)*))
-    };
+    ($w:expr, $name:ident($first:expr $(, $more:expr)* $(,)?)) => {{
+        let first = $first;
+        call!($w, first, $name(first $(, $more)*))
+    }};
     ($w:expr, $object:expr, $name:ident($($argument:expr),* $(,)?)) => {{
         let w: &$crate::api::world::World = $w;
-        w.note(|| {
-            let arguments: Vec<String> = vec![$(format!("{:?}", $argument)),*];
+        let object = $object;
+        call!(@with w, object, $name, [], $($argument,)*)
+    }};
+    // Each argument is evaluated once, so a run that is traced is the same as one that is not.
+    (@with $w:ident, $object:ident, $name:ident, [$($ready:ident)*], $next:expr, $($more:expr,)*) => {
+        match $next {
+            argument => call!(@with $w, $object, $name, [$($ready)* argument], $($more,)*),
+        }
+    };
+    (@with $w:ident, $object:ident, $name:ident, [$($ready:ident)*],) => {{
+        $w.note(|| {
+            let arguments: Vec<String> = vec![$(format!("{:?}", $ready)),*];
             format!("{}({})", stringify!($name), arguments.join(", "))
         });
-        w.before($object);
+        $w.before($object);
         // SAFETY: every pointer is NULL or valid as the header requires.
         #[allow(unused_unsafe)]
-        let returned = unsafe { mbm_c::$name($($argument),*) };
-        w.after();
-        w.note(|| format!("-> {returned:?}"));
+        let returned = unsafe { mbm_c::$name($($ready),*) };
+        $w.after();
+        $w.note(|| format!("-> {returned:?}"));
         returned
     }};
 }
