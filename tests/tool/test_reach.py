@@ -2,11 +2,11 @@
 connection, that are busy, and that are unit 0: by the name of a line, by options, and by the keys of files. Each is a device that
 people have reported; the test's comment says where."""
 
-import socket
 import time
 
 import pytest
 from peers import DAMAGED, DONE, EXCEPTION, NO_REPLY, READ, WRONG, Client, SerialDevice, TcpDevice, number, sealed, tcp_frame, wait
+from services import Broker, Subscriber
 
 FIELDS = "fields:\n- {name: a, table: holding, address: 0, type: uint16}\n"
 QUICK = ("--timeout", "300ms")
@@ -14,16 +14,16 @@ QUICK = ("--timeout", "300ms")
 
 class Device(TcpDevice):
     """Its registers are their addresses. `number` and `unit` make those of the reply from those of the request, `more` is a
-    number of registers beside those that were asked; the first `deaf` seconds of a connection it drops requests, and the first
-    `busy` requests get an exception. It notes when requests came, and which were on which connection."""
+    number of registers beside those that were asked; the first `busy` requests get an exception. It notes when requests came, and how
+    many connections there were."""
 
-    def __init__(self, number=None, unit=None, more=0, deaf=0.0, busy=(), silent=lambda turn: False, hangs_up=False, late=0.0):
-        self.renumber, self.reunit, self.more, self.deaf, self.busy = number, unit, more, deaf, list(busy)
-        self.silent, self.times, self.turn, self.hangs_up, self.late, self.connections = silent, [], 0, hangs_up, late, 0
+    def __init__(self, number=None, unit=None, more=0, busy=(), silent=lambda turn: False, late=0.0):
+        self.renumber, self.reunit, self.more, self.busy = number, unit, more, list(busy)
+        self.silent, self.times, self.turn, self.late, self.connections = silent, [], 0, late, 0
         super().__init__()
 
     def serve(self, peer):
-        opened, self.count = time.monotonic(), 0
+        self.count = 0
         self.connections += 1
         try:
             stream = peer.makefile("rb")
@@ -32,7 +32,7 @@ class Device(TcpDevice):
                 self.times.append(time.monotonic())
                 self.asked.append((head[6], pdu.hex()))
                 self.turn += 1
-                if time.monotonic() - opened < self.deaf or self.silent(self.turn):
+                if self.silent(self.turn):
                     continue
                 self.count += 1
                 transaction = int.from_bytes(head[:2], "big")
@@ -41,8 +41,6 @@ class Device(TcpDevice):
                 unit = head[6] if self.reunit is None else self.reunit
                 time.sleep(self.late)
                 peer.sendall(tcp_frame(transaction, unit, self.answer_to(pdu)))
-                if self.hangs_up:
-                    peer.shutdown(socket.SHUT_RDWR)
         except OSError:
             pass
 
@@ -145,12 +143,11 @@ def test_more_data_than_asked_are_taken_if_asked(mbm, write, generous):
 # --- pace: devices that answer nothing at first (telegraf 11919), that need a pause (HA 9451 and 50011, telegraf 9253), that are busy
 
 def test_nothing_is_sent_during_the_delay_after_connecting(mbm, write):
-    device = Device(deaf=0.5)
-    assert mbm("read", device.line, 7, *QUICK).code == NO_REPLY
-    for words in ((device.line, 7, "--delay", "800ms"), (device.line + "?delay=800ms", 7)):
-        assert mbm("read", *words, "--timeout", "2s").out == "    7  7\n"
-    assert mbm("poll", device.line, write("d.yaml", "delay: 800ms\n" + FIELDS), "--once").code == DONE
-    assert len(device.asked) == 4 and device.connections == 4
+    place = mbm.serve("tcp://127.0.0.1:0", "--echo", "--fault", "needs-delay=500ms")
+    assert mbm("read", place, 7, *QUICK).code == NO_REPLY
+    for words in ((place, 7, "--delay", "800ms"), (place + "?delay=800ms", 7)):
+        assert mbm("read", *words, "--timeout", "2s").out == "    7  0\n"
+    assert mbm("poll", place, write("d.yaml", "delay: 800ms\n" + FIELDS), "--once").code == DONE
 
 
 @pytest.mark.parametrize("key", ["message_wait: 80ms", "message_wait_milliseconds: 80"])
@@ -213,9 +210,52 @@ def test_a_connection_is_closed_after_an_error(mbm):
 
 def test_a_device_that_closes_after_each_answer_costs_no_request(mbm):
     for close in ("never", "round", "error"):
-        device = Device(hangs_up=True)
-        out = mbm("read", device.line, 7, "--every", "100ms", "--times", 4, "--csv", "--close", close).out
-        assert out.count(",success,7") == 4, out
+        place = mbm.serve("tcp://127.0.0.1:0", "--echo", "--fault", "close-after=1")
+        out = mbm("read", place, 7, "--every", "100ms", "--times", 4, "--csv", "--close", close).out
+        assert out.count(",success,0") == 4, out
+
+
+# --- the same between a broker and a device
+
+SHY = "unit=0 transaction=count needs-delay=300ms needs-message-wait=50ms exception=6@1 deaf@3".split()
+SHY_KEYS = ["accept: [unit, transaction]", "delay: 600ms", "message_wait: 80ms", "busy_retries: 1", "busy_wait: 10ms", "retries: 1"]
+SHY_FIELDS = ("unit: 9\ninterval: 200ms\nfields:\n- {name: a, table: holding, address: 0, type: uint16, value: 7, access: read-write}\n"
+              "- {name: b, table: holding, address: 300, type: uint16, value: 8, access: read-write}\n")
+
+
+@pytest.mark.parametrize("where", ["device", "line", "name", "nowhere"])
+def test_a_bridge_reaches_a_device_as_its_keys_say(mbm, folder, write, where):
+    """The keys are in the device file, in the file of the bridge, or in the name of the line."""
+    place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", SHY_FIELDS), *(word for fault in SHY for word in ("--fault", fault)))
+    broker = Broker(folder).come()
+    device = write("d.yaml", "".join(f"{key}\n" for key in SHY_KEYS if where == "device") + SHY_FIELDS)
+    keys = "".join(f", {key}" for key in SHY_KEYS if where == "line")
+    if where == "name":
+        place += "?accept=unit,transaction&delay=600ms&message_wait=80ms&busy_retries=1&busy_wait=10ms&retries=1"
+    file = write("b.yaml", f"broker: {broker.place}\ntopic: hall\nlines:\n- {{line: '{place}', topic: shy, file: {device}{keys}}}\n")
+    subscriber = Subscriber(broker)
+    mbm.begin("bridge", file, "--timeout", "1s")
+    if where == "nowhere":
+        subscriber.expect_last("hall/shy/unit/9/status", "offline")
+        assert not {7, 8} & {subscriber.value("hall/shy/a"), subscriber.value("hall/shy/b")}
+        return
+    subscriber.expect_value("hall/shy/a", 7)
+    subscriber.expect_value("hall/shy/b", 8)
+    subscriber.expect_last("hall/shy/unit/9/status", "online")
+    subscriber.expect_result("hall/shy/b", "40", "success")
+    subscriber.expect_value("hall/shy/b", 40)
+
+
+def test_a_bridge_closes_the_connection_after_each_round(mbm, folder, write):
+    """close: round leaves the only place of a device to another master."""
+    place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", SHY_FIELDS), "--fault", "connections=1")
+    broker = Broker(folder).come()
+    device = write("d.yaml", "close: round\n" + SHY_FIELDS.replace("200ms", "1s"))
+    subscriber = Subscriber(broker)
+    mbm.begin("bridge", "-b", broker.place, "-t", "hall", place, device)
+    subscriber.expect_value("hall/b", 8)
+    assert wait(lambda: mbm("write", place, 0, 33, "--unit", 9, "--timeout", "300ms").code == DONE)
+    subscriber.expect_value("hall/a", 33)
 
 
 # --- unit 0 (inverters that have no other)

@@ -284,6 +284,30 @@ def test_an_answer_comes_in_blocks(playing, line, faults, seconds):
     assert peer.last >= 0.95 * seconds
 
 
+# --- unit 0, which is a unit in frames of Modbus TCP
+
+@pytest.mark.parametrize("line", [TCP, "udp://127.0.0.1:0"])
+def test_unit_0_has_the_manners_of_other_units(mbm, playing, line):
+    place = playing("unit=5", "transaction=count", "needs-message-wait=50ms", "hole=100-109", "most-registers=80", "no-function=6",
+                    "exception=6@1", "deaf@2", line=line, units="0,7")
+    reach = ("--accept", "unit,transaction", "--message-wait", "80ms", "--busy-retries", 1, "--busy-wait", "10ms", "--retries", 1, "--unit", 0)
+    # The first request is refused, and the second gets no answer.
+    assert mbm("write", place, 0, 40, 50, *reach).code == DONE
+    assert mbm("read", place, 0, 2, *reach, "--timeout", "5s").out == "    0  40\n    1  50\n"
+    assert "exception 02" in mbm("read", place, 100, *reach).error
+    assert "exception 02" in mbm("call", place, "03 00 00 00 51", *reach).error
+    assert "exception 01" in mbm("write", place, 0, 5, *reach).error
+    # Unit 7 has the same manners, and the same registers.
+    assert mbm("read", place, 0, 2, *reach[:-1], 7).out == "    0  40\n    1  50\n"
+
+
+def test_requests_to_unit_0_count_for_faults_and_are_answered(client):
+    device = client("exception=6@2", "close-after=4", units="0")
+    assert [device.ask(0, pdu) for pdu in (write(0, 5), write(0, 6), write(1, 7, 8), read(0, 3))] == [
+        write(0, 5), b"\x86\x06", b"\x10\0\1\0\2", b"\3\6\0\5\0\7\0\x08"]
+    assert has_ended(device)
+
+
 # --- the masters that suffer
 
 @pytest.mark.parametrize("faults, by_mbm, sentence, by_libmodbus, by_pymodbus", [
