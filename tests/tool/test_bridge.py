@@ -214,7 +214,7 @@ PLACE = "rtu:/dev/null"
 # Each file differs in one place from a right one.
 @pytest.mark.parametrize("field, sentence", [
     (RIGHT.replace("address: 0, ", ""), ":3: the field has no key address"),
-    (f"{RIGHT}, unit: 300", 'unit: "300" is out of range: from 1 to 255'),
+    (f"{RIGHT}, unit: 300", 'unit: "300" is out of range: from 0 to 255'),
     (RIGHT.replace("holding", "register"), 'table: "register" is not one of coils, discrete, holding'),
     (RIGHT.replace(": 0", ": 65536"), 'address: "65536" is out of range: from 0 to 65535'),
     (RIGHT.replace("uint16", "word"), 'type: "word" is not one of bit, uint16'),

@@ -129,13 +129,13 @@ DATA = b"\3\2\0\x2A"
 
 
 @pytest.mark.parametrize("answer, sentence", [
-    (lambda head: bytes([head[0], head[1] ^ 5]) + head[2:] + DATA, "a reply came with transaction number 5, and the request had 0."),
+    (lambda head: bytes([head[0], head[1] ^ 5]) + head[2:] + DATA, "a reply with transaction number 5 came, and the request had 0; --accept transaction takes it."),
     (lambda head: head[:2] + b"\0\1" + head[4:] + DATA, "a reply came with protocol id 1, which is 0 in Modbus TCP."),
     (lambda head: b"HTTP/1." + DATA, "a reply came with protocol id 21584, which is 0 in Modbus TCP."),
     (lambda head: head[:4] + b"\0\6" + head[6:] + DATA, "a reply came whose header announces 6 bytes, and 5 came."),
     (lambda head: head[:4] + b"\0\0" + head[6:] + DATA, "a reply came whose header announces 0 bytes, and 2 to 254 are possible."),
     (lambda head: head[:4] + b"\5\0" + head[6:] + DATA, "a reply came whose header announces 1280 bytes"),
-    (lambda head: head[:6] + b"\xFF" + DATA, "only other units answered: a reply of unit 255 came. Check the unit's number."),
+    (lambda head: head[:6] + b"\xFF" + DATA, "only other units answered: a reply of unit 255 came; --accept unit takes it. Check the unit's number."),
     (lambda head: head[:3], "3 bytes came, and a reply begins with a header of 7."),
     (lambda head: head[6:] + DATA + crc(head[6:] + DATA), "it looks like a frame of rtu+tcp://"),
 ], ids=["transaction number", "protocol id", "no protocol", "too long", "length 0", "bytes in the wrong order", "another unit", "half a header",
@@ -153,9 +153,9 @@ def test_a_reply_with_a_wrong_header_is_not_reported_as_silence(mbm, answer, sen
 def test_wrong_headers_of_several_units_are_reported_for_each(mbm):
     line = header_device(lambda head: bytes([head[0], head[1] ^ 0x80]) + head[2:] + DATA)
     code, out, error = mbm("read", line, 0, "-u", "1-2", "--timeout", "200ms")
-    assert (out.count("a reply came with transaction number"), error.count("a reply came with transaction number")) == (2, 2)
+    assert (out.count("a reply with transaction number"), error.count("a reply with transaction number")) == (2, 2)
     _, _, error = mbm("scan", line, "--units", "1-3", "--timeout", "200ms")
-    assert "0 of 3 requests were answered, although a reply came with transaction number 128, and the request had 0." in error
+    assert "0 of 3 requests were answered, although a reply with transaction number 128 came, and the request had 0; --accept transaction takes it." in error
 
 
 def test_a_late_reply_is_explained(mbm):

@@ -312,7 +312,7 @@ def test_requests_to_unit_0_count_for_faults_and_are_answered(client):
 
 @pytest.mark.parametrize("faults, by_mbm, sentence, by_libmodbus, by_pymodbus", [
     (["unit=0"], NO_REPLY, "a reply of unit 0 came", ["0"], None),
-    (["transaction=7"], NO_REPLY, "a reply came with transaction number 7", "Invalid data", NOTHING),
+    (["transaction=7"], NO_REPLY, "a reply with transaction number 7 came", "Invalid data", NOTHING),
     (["only-function=16"], EXCEPTION, "exception 01", "Illegal function", "exception 01"),
     (["hole=0"], EXCEPTION, "exception 02", "Illegal data address", "exception 02"),
     (["most-registers=1", "refused-with=3"], EXCEPTION, "exception 03", "Illegal data value", "exception 03"),
