@@ -360,7 +360,8 @@ uint8_t mbm_plan_checkAvailable(const mbm_plan *plan, uint16_t field, uint16_t i
                                 const mbm_planConversion *conversion);
 
 /**
- * As mbm_plan_getConverted, for registers that a program has read without a plan.
+ * As mbm_plan_getConverted, for registers that a program has read without a plan. On a Cortex-M it
+ * takes 420 bytes of stack.
  *
  * @param registers   the registers of the field, and of its power of ten
  * @param fields      a table of fields, each as for mbm_plan_begin; they say where in the registers

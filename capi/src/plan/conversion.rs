@@ -275,7 +275,8 @@ pub unsafe extern "C" fn mbm_plan_checkAvailable(
     )
 }
 
-/// As mbm_plan_getConverted, for registers that a program has read without a plan.
+/// As mbm_plan_getConverted, for registers that a program has read without a plan. On a Cortex-M it
+/// takes 420 bytes of stack.
 ///
 /// @param registers   the registers of the field, and of its power of ten
 /// @param fields      a table of fields, each as for mbm_plan_begin; they say where in the registers
