@@ -317,20 +317,20 @@ uint8_t mbm_plan_beginGrouped(mbm_plan *plan, mbm_client *client, const mbm_plan
 uint8_t mbm_plan_end(mbm_plan *plan);
 
 /**
- * A value as a double, converted: with the multiplier and the divisor of its field, the power of
- * ten and the offset, rounded once, to the nearest. On AVR, where C's double has 32 bits, it is
- * rounded to these after that.
+ * A value as a double, converted: with the multiplier and the divisor of its field, the power
+ * of ten and the offset, rounded once, to the nearest. On AVR, where C's double has 32 bits,
+ * it is rounded to these after that.
  *
- * The power and the number are of one reply if one read of the plan has both, as it has if they
- * stand side by side with one interval.
+ * The power and the number are of one reply if one read of the plan has both, as it has if
+ * they stand side by side with one interval.
  *
  * @param field       the index of the field, of a bit, an integer or a float
  * @param index       which of its values, 0 for the first
  * @param conversion  that of the field; NULL for none
  * @param value       gets the number; a float that is infinite stays so
- * @return a status; MBM_NOT_AVAILABLE if the device says that it has no value, if its power of ten
- *         was never read, if that is not -10 to 10, or if the last read of the power failed
- *         although that of the number did not; MBM_INVALID_ARGUMENT for a text or
+ * @return a status; MBM_NOT_AVAILABLE if the device says that it has no value, if its power of
+ *         ten was never read, if that is not -10 to 10, or if the last read of the power
+ *         failed although that of the number did not; MBM_INVALID_ARGUMENT for a text or
  *         MBM_TYPE_REGISTERS, and for a conversion that is not as it must be; if no value has
  *         arrived yet the status that mbm_plan_getStatus returns
  */
@@ -338,13 +338,14 @@ uint8_t mbm_plan_getConverted(const mbm_plan *plan, uint16_t field, uint16_t ind
                               const mbm_planConversion *conversion, double *value);
 
 /**
- * As mbm_plan_getConverted, as an integer: the value times 10^`decimals`, rounded to the nearest,
- * halves away from 0. It needs no arithmetic on floats: less code on a microcontroller.
+ * As mbm_plan_getConverted, as an integer: the value times 10^`decimals`, rounded to the
+ * nearest, halves away from 0. It needs no arithmetic on floats: less code on a
+ * microcontroller.
  *
  * @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
  * @param decimals  0 to 9: 21.5 is 215 with 1 decimal
- * @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to it,
- *         is too large: number * multiplier * 10^(power + decimals) must be below 2^64
+ * @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to
+ *         it, is too large: number * multiplier * 10^(power + decimals) must be below 2^64
  */
 uint8_t mbm_plan_getDecimal(const mbm_plan *plan, uint16_t field, uint16_t index,
                             const mbm_planConversion *conversion, uint8_t decimals, int32_t *value);
@@ -360,12 +361,12 @@ uint8_t mbm_plan_checkAvailable(const mbm_plan *plan, uint16_t field, uint16_t i
                                 const mbm_planConversion *conversion);
 
 /**
- * As mbm_plan_getConverted, for registers that a program has read without a plan. On a Cortex-M it
- * takes 420 bytes of stack.
+ * As mbm_plan_getConverted, for registers that a program has read without a plan. On a
+ * Cortex-M it takes 420 bytes of stack.
  *
  * @param registers   the registers of the field, and of its power of ten
- * @param fields      a table of fields, each as for mbm_plan_begin; they say where in the registers
- *                    the numbers are; their unit does not count
+ * @param fields      a table of fields, each as for mbm_plan_begin; they say where in the
+ *                    registers the numbers are; their unit does not count
  * @param field       the index of the field in the table
  * @param index       which of its values, 0 for the first
  * @param conversion  that of the field; NULL for none

@@ -192,165 +192,91 @@ fn double(bits: u64) -> f32 {
     ShortDouble::from_bytes(bits.to_be_bytes()).0
 }
 
-/// A value as a double, converted: with the multiplier and the divisor of its field, the power of
-/// ten and the offset, rounded once, to the nearest. On AVR, where C's double has 32 bits, it is
-/// rounded to these after that.
-///
-/// The power and the number are of one reply if one read of the plan has both, as it has if they
-/// stand side by side with one interval.
-///
-/// @param field       the index of the field, of a bit, an integer or a float
-/// @param index       which of its values, 0 for the first
-/// @param conversion  that of the field; NULL for none
-/// @param value       gets the number; a float that is infinite stays so
-/// @return a status; MBM_NOT_AVAILABLE if the device says that it has no value, if its power of ten
-///         was never read, if that is not -10 to 10, or if the last read of the power failed
-///         although that of the number did not; MBM_INVALID_ARGUMENT for a text or
-///         MBM_TYPE_REGISTERS, and for a conversion that is not as it must be; if no value has
-///         arrived yet the status that mbm_plan_getStatus returns
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getConverted(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-    value: *mut f64,
-) -> u8 {
-    get(
-        plan,
-        field,
-        index,
-        conversion,
-        value.cast(),
-        |words, with, power| words.converted(with, power).map(double),
-    )
+functions! {
+    (plan: *const mbm_plan)
+
+    /// A value as a double, converted: with the multiplier and the divisor of its field, the power
+    /// of ten and the offset, rounded once, to the nearest. On AVR, where C's double has 32 bits,
+    /// it is rounded to these after that.
+    ///
+    /// The power and the number are of one reply if one read of the plan has both, as it has if
+    /// they stand side by side with one interval.
+    ///
+    /// @param field       the index of the field, of a bit, an integer or a float
+    /// @param index       which of its values, 0 for the first
+    /// @param conversion  that of the field; NULL for none
+    /// @param value       gets the number; a float that is infinite stays so
+    /// @return a status; MBM_NOT_AVAILABLE if the device says that it has no value, if its power of
+    ///         ten was never read, if that is not -10 to 10, or if the last read of the power
+    ///         failed although that of the number did not; MBM_INVALID_ARGUMENT for a text or
+    ///         MBM_TYPE_REGISTERS, and for a conversion that is not as it must be; if no value has
+    ///         arrived yet the status that mbm_plan_getStatus returns
+    fn mbm_plan_getConverted(
+        field: u16, index: u16, conversion: *const mbm_planConversion, value: *mut f64
+    ) = get(field, index, conversion, value.cast(), |words, with, power| {
+        words.converted(with, power).map(double)
+    });
+
+    /// As mbm_plan_getConverted, as an integer: the value times 10^`decimals`, rounded to the
+    /// nearest, halves away from 0. It needs no arithmetic on floats: less code on a
+    /// microcontroller.
+    ///
+    /// @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
+    /// @param decimals  0 to 9: 21.5 is 215 with 1 decimal
+    /// @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to
+    ///         it, is too large: number * multiplier * 10^(power + decimals) must be below 2^64
+    fn mbm_plan_getDecimal(
+        field: u16, index: u16, conversion: *const mbm_planConversion, decimals: u8, value: *mut i32
+    ) = get(field, index, conversion, value, |words, with, power| {
+        words.decimal(with, power, decimals)
+    });
+
+    /// Whether the last value that was read is available: for a value that the program takes in
+    /// another way, such as with mbm_plan_getInt32 or mbm_plan_getText.
+    ///
+    /// @param field  the index of the field, of any type
+    /// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_plan_getConverted
+    fn mbm_plan_checkAvailable(field: u16, index: u16, conversion: *const mbm_planConversion)
+        = get(field, index, conversion, &mut (), |words, with, _| words.available(with));
 }
 
-/// As mbm_plan_getConverted, as an integer: the value times 10^`decimals`, rounded to the nearest,
-/// halves away from 0. It needs no arithmetic on floats: less code on a microcontroller.
-///
-/// @param field     the index of the field, of a bit or of an integer of 16 or 32 bits
-/// @param decimals  0 to 9: 21.5 is 215 with 1 decimal
-/// @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to it,
-///         is too large: number * multiplier * 10^(power + decimals) must be below 2^64
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getDecimal(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-    decimals: u8,
-    value: *mut i32,
-) -> u8 {
-    get(
-        plan,
-        field,
-        index,
-        conversion,
-        value,
-        |words, with, power| words.decimal(with, power, decimals),
-    )
-}
+functions! {
+    (registers: *const mbm_registers)
 
-/// Whether the last value that was read is available: for a value that the program takes in
-/// another way, such as with mbm_plan_getInt32 or mbm_plan_getText.
-///
-/// @param field  the index of the field, of any type
-/// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_plan_getConverted
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_checkAvailable(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-) -> u8 {
-    let mut available = ();
-    get(
-        plan,
-        field,
-        index,
-        conversion,
-        &raw mut available,
-        |words, with, _| words.available(with),
-    )
-}
+    /// As mbm_plan_getConverted, for registers that a program has read without a plan. On a
+    /// Cortex-M it takes 420 bytes of stack.
+    ///
+    /// @param registers   the registers of the field, and of its power of ten
+    /// @param fields      a table of fields, each as for mbm_plan_begin; they say where in the
+    ///                    registers the numbers are; their unit does not count
+    /// @param field       the index of the field in the table
+    /// @param index       which of its values, 0 for the first
+    /// @param conversion  that of the field; NULL for none
+    /// @param value       gets the number
+    /// @return as mbm_plan_getConverted; MBM_ILLEGAL_DATA_ADDRESS if `registers` lack one that is
+    ///         needed; otherwise a status as mbm_plan_begin for the field; see mbm_registers
+    fn mbm_registers_getConverted(
+        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion,
+        value: *mut f64
+    ) = find_in(fields, field, index, conversion, value.cast(), |words, with, power| {
+        words.converted(with, power).map(double)
+    });
 
-/// As mbm_plan_getConverted, for registers that a program has read without a plan. On a Cortex-M it
-/// takes 420 bytes of stack.
-///
-/// @param registers   the registers of the field, and of its power of ten
-/// @param fields      a table of fields, each as for mbm_plan_begin; they say where in the registers
-///                    the numbers are; their unit does not count
-/// @param field       the index of the field in the table
-/// @param index       which of its values, 0 for the first
-/// @param conversion  that of the field; NULL for none
-/// @param value       gets the number
-/// @return as mbm_plan_getConverted; MBM_ILLEGAL_DATA_ADDRESS if `registers` lack one that is
-///         needed; otherwise a status as mbm_plan_begin for the field; see mbm_registers
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getConverted(
-    registers: *const mbm_registers,
-    fields: *const mbm_planField,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-    value: *mut f64,
-) -> u8 {
-    find_in(
-        registers,
-        fields,
-        field,
-        index,
-        conversion,
-        value.cast(),
-        |words, with, power| words.converted(with, power).map(double),
-    )
-}
+    /// As mbm_plan_getDecimal, for registers that a program has read without a plan.
+    ///
+    /// @param decimals  0 to 9
+    /// @return as mbm_registers_getConverted and mbm_plan_getDecimal
+    fn mbm_registers_getDecimal(
+        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion,
+        decimals: u8, value: *mut i32
+    ) = find_in(fields, field, index, conversion, value, |words, with, power| {
+        words.decimal(with, power, decimals)
+    });
 
-/// As mbm_plan_getDecimal, for registers that a program has read without a plan.
-///
-/// @param decimals  0 to 9
-/// @return as mbm_registers_getConverted and mbm_plan_getDecimal
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getDecimal(
-    registers: *const mbm_registers,
-    fields: *const mbm_planField,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-    decimals: u8,
-    value: *mut i32,
-) -> u8 {
-    find_in(
-        registers,
-        fields,
-        field,
-        index,
-        conversion,
-        value,
-        |words, with, power| words.decimal(with, power, decimals),
-    )
-}
-
-/// As mbm_plan_checkAvailable, for registers that a program has read without a plan.
-///
-/// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_registers_getConverted
-#[no_mangle]
-pub unsafe extern "C" fn mbm_registers_checkAvailable(
-    registers: *const mbm_registers,
-    fields: *const mbm_planField,
-    field: u16,
-    index: u16,
-    conversion: *const mbm_planConversion,
-) -> u8 {
-    let mut available = ();
-    find_in(
-        registers,
-        fields,
-        field,
-        index,
-        conversion,
-        &raw mut available,
-        |words, with, _| words.available(with),
-    )
+    /// As mbm_plan_checkAvailable, for registers that a program has read without a plan.
+    ///
+    /// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_registers_getConverted
+    fn mbm_registers_checkAvailable(
+        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion
+    ) = find_in(fields, field, index, conversion, &mut (), |words, with, _| words.available(with));
 }
