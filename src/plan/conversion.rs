@@ -4,6 +4,7 @@
 //! value = number * multiplier / divisor * 10^power + offset
 
 use super::field::{Field, DOUBLE, FLOAT, INT32, TEXT};
+use super::number::{parts, ONE};
 use super::value::{scale, Words};
 use super::wide::Wide;
 use crate::data::arithmetic::times_small;
@@ -104,14 +105,10 @@ impl Words<'_> {
         self.available(conversion)?;
         let ((significand, is_below), exponent) = if field.value_type >= FLOAT {
             let bits = self.double()?;
-            let fraction = bits & ((1 << 52) - 1);
-            let (significand, exponent) = match (bits >> 52) as i32 & 0x7FF {
-                0x7FF => return Ok(bits ^ u64::from(field.multiplier < 0) << 63),
-                0 => (fraction, 1),
-                exponent => (fraction | 1 << 52, exponent),
+            let Some((significand, exponent)) = parts(bits) else {
+                return Ok(bits ^ u64::from(field.multiplier < 0) << 63);
             };
-            // A significand of 1 with the exponent 1075 is 1.
-            ((significand, bits >> 63 != 0), exponent - 1075)
+            ((significand, bits >> 63 != 0), exponent - ONE)
         } else {
             (self.magnitude(), 0)
         };

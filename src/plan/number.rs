@@ -12,6 +12,19 @@ const MAX_EXPONENT: i32 = 0x7FF;
 const BIAS: i32 = 1023;
 /// The bits of a float's fraction.
 const FRACTION: u32 = 52;
+/// The exponent with which a significand of 1 is 1.
+pub(super) const ONE: i32 = BIAS + FRACTION as i32;
+
+/// The significand of a float and its exponent, without the sign; `None` for infinity and a NaN.
+#[inline(always)]
+pub(super) fn parts(bits: u64) -> Option<(u64, i32)> {
+    let fraction = bits & ((1 << FRACTION) - 1);
+    match (bits >> FRACTION) as i32 & MAX_EXPONENT {
+        MAX_EXPONENT => None,
+        0 => Some((fraction, 1)),
+        exponent => Some((fraction | 1 << FRACTION, exponent)),
+    }
+}
 
 impl Words<'_> {
     /// The bits of a value as a float of 64 bits: a bit, an integer or a float, multiplied and
@@ -30,11 +43,9 @@ impl Words<'_> {
             FLOAT | DOUBLE => {
                 let bits = self.double()?;
                 sign ^= bits & SIGN;
-                let fraction = bits & ((1 << FRACTION) - 1);
-                match (bits >> FRACTION) as i32 & MAX_EXPONENT {
-                    MAX_EXPONENT => return Ok(bits & !SIGN | sign),
-                    0 => (fraction, 1),
-                    exponent => (fraction | 1 << FRACTION, exponent),
+                match parts(bits) {
+                    Some(parts) => parts,
+                    None => return Ok(bits & !SIGN | sign),
                 }
             }
             _ => {
@@ -42,15 +53,14 @@ impl Words<'_> {
                 if is_below {
                     sign ^= SIGN;
                 }
-                (magnitude, BIAS + FRACTION as i32)
+                (magnitude, ONE)
             }
         };
         Ok(sign | quotient(significand, exponent, multiplier, divisor))
     }
 }
 
-/// The bits of the float nearest to a significand, multiplied and divided. A significand of 1
-/// with the exponent `BIAS + FRACTION` is 1.
+/// The bits of the float nearest to a significand, multiplied and divided.
 fn quotient(significand: u64, mut exponent: i32, multiplier: u32, divisor: u32) -> u64 {
     // 96 bits at most.
     let mut product = 0u128;
@@ -105,8 +115,6 @@ mod tests {
     use super::*;
     use crate::plan::Field;
     use proptest::prelude::*;
-
-    const ONE: i32 = BIAS + FRACTION as i32;
 
     fn of_float(number: f64, multiplier: i32, divisor: i32) -> f64 {
         let bytes = number.to_be_bytes();
