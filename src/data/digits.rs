@@ -44,24 +44,7 @@ const M10K: u16 = 10_000;
 /// # Errors
 /// [`Error::MALFORMED_VALUE`] for a register above 9999.
 pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
-    let (mut number, mut left) = (0, highest_first(raw, count));
-    for _ in 0..count {
-        let part = (left >> 48) as u16;
-        left <<= 16;
-        if part >= M10K {
-            return Err(Error::MALFORMED_VALUE);
-        }
-        number = times_small(number, M10K).0 + u64::from(part);
-    }
-    Ok(number)
-}
-
-/// `count` registers as the highest ones of four.
-fn highest_first(mut raw: u64, count: u16) -> u64 {
-    for _ in count..4 {
-        raw <<= 16;
-    }
-    raw
+    number_of(raw, count, |part| part < M10K)
 }
 
 /// The number of `count` registers of modulo 10000, each -9999 to 9999 in two's complement.
@@ -69,18 +52,27 @@ fn highest_first(mut raw: u64, count: u16) -> u64 {
 /// # Errors
 /// [`Error::MALFORMED_VALUE`] for a register beyond that.
 pub fn from_signed_m10k(raw: u64, count: u16) -> Result<i64, Error> {
-    let (mut number, mut left) = (0u64, highest_first(raw, count));
-    for _ in 0..count {
-        let part = ((left >> 48) as u16).cast_signed();
+    let is_right = |part: u16| part.cast_signed().unsigned_abs() < M10K;
+    number_of(raw, count, is_right).map(u64::cast_signed)
+}
+
+/// The number of `count` registers, in two's complement, if all of them are right.
+#[inline(always)]
+fn number_of(raw: u64, count: u16, is_right: impl Fn(u16) -> bool) -> Result<u64, Error> {
+    let (mut number, mut left) = (0u64, raw);
+    for _ in count..4 {
         left <<= 16;
-        if part.unsigned_abs() >= M10K {
+    }
+    for _ in 0..count {
+        let part = (left >> 48) as u16;
+        left <<= 16;
+        if !is_right(part) {
             return Err(Error::MALFORMED_VALUE);
         }
-        // In two's complement.
         number = times_small(number, M10K).0;
-        number = number.wrapping_add(i64::from(part).cast_unsigned());
+        number = number.wrapping_add(i64::from(part.cast_signed()).cast_unsigned());
     }
-    Ok(number.cast_signed())
+    Ok(number)
 }
 
 /// A number in `count` registers of modulo 10000.
