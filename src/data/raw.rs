@@ -13,9 +13,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count, or for an
     /// order by halves of three registers.
     pub fn raw(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
-        if count.wrapping_sub(1) > 3 {
-            return Err(Error::INVALID_ARGUMENT);
-        }
+        check_count(count, 4)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
         let mut raw = 0;
         for nth in 0..count {
@@ -101,6 +99,14 @@ impl<C: RegisterBytesMut> Registers<C> {
         let raw = others | shifted_left(number, first);
         self.set_raw(order, address, count, raw)
     }
+}
+
+/// Refuses a count of registers that is not 1 to `most`.
+pub(super) fn check_count(count: u16, most: u16) -> Result<(), Error> {
+    if count.wrapping_sub(1) >= most {
+        return Err(Error::INVALID_ARGUMENT);
+    }
+    Ok(())
 }
 
 /// The mask of `bits` bits from bit `first` on, of `count` registers.

@@ -4,6 +4,7 @@
 use super::digits;
 use super::half;
 use super::order::Order;
+use super::raw::check_count;
 use super::view::{RegisterBytes, RegisterBytesMut, Registers};
 use crate::error::Error;
 
@@ -14,7 +15,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count;
     /// [`Error::MALFORMED_VALUE`] for a digit above 9.
     pub fn bcd(&self, order: Order, address: u16, count: u16) -> Result<u32, Error> {
-        at_most_2(count)?;
+        check_count(count, 2)?;
         digits::from_bcd(self.raw(order, address, count)? as u32)
     }
 
@@ -74,7 +75,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count.
     pub fn sign_magnitude(&self, order: Order, address: u16, count: u16) -> Result<i32, Error> {
-        at_most_2(count)?;
+        check_count(count, 2)?;
         let raw = self.raw(order, address, count)? as u32;
         let sign = sign_of(count);
         let magnitude = (raw & (sign - 1)).cast_signed();
@@ -107,7 +108,7 @@ impl<C: RegisterBytesMut> Registers<C> {
         count: u16,
         number: u32,
     ) -> Result<(), Error> {
-        at_most_2(count)?;
+        check_count(count, 2)?;
         let raw = digits::to_bcd(number, 4 * u32::from(count))?;
         self.set_raw(order, address, count, raw.into())
     }
@@ -123,7 +124,7 @@ impl<C: RegisterBytesMut> Registers<C> {
         count: u16,
         number: u64,
     ) -> Result<(), Error> {
-        at_most_4(count)?;
+        check_count(count, 4)?;
         self.set_raw(order, address, count, digits::to_m10k(number, count)?)
     }
 
@@ -138,7 +139,7 @@ impl<C: RegisterBytesMut> Registers<C> {
         count: u16,
         number: i64,
     ) -> Result<(), Error> {
-        at_most_4(count)?;
+        check_count(count, 4)?;
         let raw = digits::to_signed_m10k(number, count)?;
         self.set_raw(order, address, count, raw)
     }
@@ -195,7 +196,7 @@ impl<C: RegisterBytesMut> Registers<C> {
         count: u16,
         number: i32,
     ) -> Result<(), Error> {
-        at_most_2(count)?;
+        check_count(count, 2)?;
         let sign = sign_of(count);
         let magnitude = number.unsigned_abs();
         if magnitude >= sign {
@@ -217,22 +218,6 @@ impl<C: RegisterBytesMut> Registers<C> {
     pub fn set_half(&mut self, order: Order, address: u16, number: f32) -> Result<(), Error> {
         self.set_in(order, address, half::from_float(number.to_bits())?)
     }
-}
-
-/// Refuses a count of registers that is not 1 or 2.
-fn at_most_2(count: u16) -> Result<(), Error> {
-    if count.wrapping_sub(1) > 1 {
-        return Err(Error::INVALID_ARGUMENT);
-    }
-    Ok(())
-}
-
-/// Refuses a count of registers that is not 1 to 4.
-fn at_most_4(count: u16) -> Result<(), Error> {
-    if count.wrapping_sub(1) > 3 {
-        return Err(Error::INVALID_ARGUMENT);
-    }
-    Ok(())
 }
 
 /// The bit of the sign in one or two registers.
