@@ -91,8 +91,7 @@ impl Splitter<'_> {
         if refusal || flags & TRIAL != 0 && is_failure(status) {
             let (first, end) = self.places(read);
             if let Some(cut) = self.find_cut(first, end) {
-                if self.divide(read, (first, cut, end), now) {
-                    self.each_half(read, |half| half.status.set(before.code()));
+                if self.divide(read, (first, cut, end), before, now) {
                     return Finding::Divided;
                 }
                 // There is no storage: the read is as any other.
@@ -207,14 +206,6 @@ impl Splitter<'_> {
         }
     }
 
-    fn each_half(&self, read: usize, change: impl Fn(&Read)) {
-        for half in [read, self.count - 1] {
-            if let Some(half) = self.reads.get(half) {
-                change(half);
-            }
-        }
-    }
-
     fn field(&self, place: usize) -> &Field {
         let position = self.positions.get(place);
         let field = position.and_then(|position| self.fields.get(position.field()));
@@ -315,8 +306,15 @@ impl Splitter<'_> {
 
     // --- cutting and joining ---
 
-    /// Cuts a read at a place. Returns false if there is no storage for another read or its data.
-    fn divide(&mut self, read: usize, places: (usize, usize, usize), now: u32) -> bool {
+    /// Cuts a read at a place. Both halves get the status `before`. Returns false if there is no
+    /// storage for another read or its data.
+    fn divide(
+        &mut self,
+        read: usize,
+        places: (usize, usize, usize),
+        before: Status,
+        now: u32,
+    ) -> bool {
         let (first, cut, end) = places;
         let (left, right) = (self.part(first, cut), self.part(cut, end));
         let new = self.count;
@@ -375,6 +373,7 @@ impl Splitter<'_> {
         });
         for half in [old, half] {
             half.due.set(now);
+            half.status.set(before.code());
         }
         self.count += 1;
         let block = self.block(read) as u16;
