@@ -67,7 +67,8 @@ pub struct Object {
 pub(super) struct Pace {
     /// The delay after connecting, in milliseconds.
     pub(super) delay_ms: u16,
-    /// One of MBM_LINK_CLOSE_, and whether the delay is over. (In one byte: an object has no other.)
+    /// MBM_LINK_CLOSE_..., added up, and whether the delay is over. (One byte holds both: the storage
+    /// of a link has no other.)
     pub(super) flags: u8,
 }
 

@@ -2,7 +2,7 @@
 //! that calls neither setter contains none of this code.
 
 use super::object::{advance as advance_link, advance_noting, mbm_link, Object};
-use crate::client::object::{self as client, LinkedKind};
+use crate::client::object as client;
 use crate::client::request::RequestPtr;
 use crate::pointers;
 use mbm::client::{ClientRequest as _, LinkState};
@@ -123,9 +123,8 @@ unsafe fn hold(
     fresh: bool,
 ) -> Option<RequestPtr> {
     let left = millis((*link).pace.delay_ms) - (*link).core.age(now);
-    let transport: *const LinkedKind = &raw const (*link).kind;
     if client::queue(object).has_lost() {
-        let storage = (*(*transport).transport).storage(object);
+        let storage = (*(*link).kind.transport).storage(object);
         return client::queue(object).end_lost(now, storage);
     }
     let mut ended = None;
