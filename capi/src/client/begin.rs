@@ -4,6 +4,7 @@ use super::kind;
 use super::object::{
     mbm_client, queue, transport, LinkedKind, SerialTransport, TcpTransport, TransportKind,
 };
+use super::tolerance::allowed;
 use crate::framing::{is_delimiter, MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
 use crate::pointers::{self, CObject};
 use crate::port::{countable, mbm_port};
@@ -196,10 +197,7 @@ pub unsafe extern "C" fn mbm_client_beginTcp(
 pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u8) -> u8 {
     pointers::with(client, |object| match ((*(*object).kind).framing, most) {
         (MBM_FRAMING_TCP, 1..=super::MBM_CLIENT_DEPTH) => {
-            match transport::<TcpTransport>(object).set_in_flight(most) {
-                true => Status::OK,
-                false => Status::INVALID_ARGUMENT,
-            }
+            allowed(transport::<TcpTransport>(object).set_in_flight(most))
         }
         (MBM_FRAMING_RTU | MBM_FRAMING_ASCII, 1) => Status::OK,
         _ => Status::INVALID_ARGUMENT,

@@ -43,7 +43,7 @@ unsafe fn set_tolerant(
 }
 
 /// The status of a setting that is refused if `is_allowed` is false.
-fn allowed(is_allowed: bool) -> Status {
+pub(super) fn allowed(is_allowed: bool) -> Status {
     match is_allowed {
         true => Status::OK,
         false => Status::INVALID_ARGUMENT,
