@@ -262,7 +262,7 @@ pub(crate) const QUEUE: u8 = 3;
 /// The rule of 2B/0E (hex).
 pub(crate) const OBJECTS: u8 = 7;
 /// The lowest of three bits: the number of bytes of the request that the response repeats.
-pub(crate) const REPEATED: u32 = 25;
+const REPEATED: u32 = 25;
 /// The lowest of three bits: the index of the data in the response; 0 if it has none.
 pub(crate) const DATA: u32 = 28;
 
@@ -276,7 +276,7 @@ impl FunctionSpec {
         }
     }
 
-    pub(crate) const fn new(
+    const fn new(
         function: u8,
         flags: u32,
         head: u32,
@@ -300,12 +300,12 @@ impl FunctionSpec {
     }
 
     /// 01, 02.
-    pub(crate) const fn bits(function: u8) -> FunctionSpec {
+    const fn bits(function: u8) -> FunctionSpec {
         FunctionSpec::new(function, RANGE | BITS | READ, 5, 0, 0, 2)
     }
 
     /// 03, 04.
-    pub(crate) const fn registers(function: u8) -> FunctionSpec {
+    const fn registers(function: u8) -> FunctionSpec {
         FunctionSpec::new(function, RANGE | READ | TAKES_WORDS, 5, 0, 0, 2)
     }
 
@@ -320,12 +320,12 @@ impl FunctionSpec {
     }
 
     /// A request of five bytes that the response repeats.
-    pub(crate) const fn echoed(function: u8, flags: u32) -> FunctionSpec {
+    const fn echoed(function: u8, flags: u32) -> FunctionSpec {
         FunctionSpec::new(function, flags, 5, 5, 5, 0)
     }
 
     /// A request that is a function code alone. The table says how long its response is.
-    pub(crate) const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
+    const fn bare(function: u8, flags: u32, data: u32) -> FunctionSpec {
         let (kind, length) = match response(function) {
             Some(Rule::Fixed(length)) => (FIXED, length),
             Some(Rule::Counted(offset, _)) => (COUNTS, offset),
