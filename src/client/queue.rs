@@ -341,6 +341,7 @@ impl<J: ClientRequest, const N: usize> RequestQueue<J, N> {
     /// lost; `None` if there is none.
     #[inline(always)]
     pub fn end_lost(&mut self, now: u32, storage: &mut impl ClientStorage) -> Option<J> {
+        // With `position`, a client with a link takes 62 bytes more on a Cortex-M0+.
         let mut at = 0;
         while !is_lost(self.queue.get(at)?) {
             at += 1;
