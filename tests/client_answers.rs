@@ -1,5 +1,4 @@
-//! Which fields of a response must match the request, and that the faster path which a TCP client has for
-//! the response to its first request gives the same result as the general one.
+//! Which fields of a response must match the request, be it the first in flight or a later one.
 
 #[path = "common/stream.rs"]
 mod stream;

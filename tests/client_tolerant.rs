@@ -11,7 +11,7 @@ use mbm::error::Status;
 use mbm::pdu::functions::FunctionSpec;
 use proptest::prelude::*;
 use stream::wire::{End, Lent, Task};
-use stream::{read, requests, response};
+use stream::{poll, read, requests, response};
 
 type Tolerant = Client<TolerantTcp<End, Lent>, Task, 16>;
 
@@ -24,14 +24,6 @@ fn client(accept: u8) -> (End, Tolerant) {
     let mut client: Tolerant = Client::new(TolerantTcp::new(end.clone(), Lent::default()));
     assert!(client.line.set_accept(accept));
     (end, client)
-}
-
-fn poll(end: &End, client: &mut Tolerant) -> Vec<Task> {
-    let mut ended = Vec::new();
-    while let Some(task) = client.poll(end.now()) {
-        ended.push(task);
-    }
-    ended
 }
 
 /// Queues a read of an address, and returns the request as it was sent.

@@ -4,7 +4,7 @@
 #[path = "wire.rs"]
 pub mod wire;
 
-use mbm::client::{Client, Tcp};
+use mbm::client::{Client, Tcp, Transport};
 use mbm::frame::tcp;
 use mbm::pdu::functions::FunctionSpec;
 use wire::{End, Lent, Task};
@@ -50,7 +50,7 @@ pub fn response((wire, unit, address): (u16, u8, u16)) -> Vec<u8> {
 }
 
 /// Polls once as C does: until no further request has ended.
-pub fn poll(end: &End, client: &mut TcpIp) -> Vec<Task> {
+pub fn poll<L: Transport<Task>>(end: &End, client: &mut Client<L, Task, 16>) -> Vec<Task> {
     let mut ended = Vec::new();
     while let Some(task) = client.poll(end.now()) {
         ended.push(task);
