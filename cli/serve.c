@@ -525,10 +525,32 @@ static void announce(const served_units *units, const char *name)
     report_flush();
 }
 
+/* Reads the device file, and its units. Returns CODE_DONE, or another exit code after reporting the
+ * reason. */
+static int read_device(serving *s, device *from)
+{
+    char wrong[YAML_FILE_WRONG_BYTES];
+    const char *why;
+    unsigned count;
+    const int code = device_file_read(from, s->file, wrong);
+
+    if (code != CODE_DONE)
+        return report(code, "%s", wrong);
+    why = device_plan_check(from, s->file, s->where.framing);
+    if (why)
+        return report(CODE_WRONG, "%s", why);
+    count = served_ids(from, s->ids);
+    if (count > UINT8_MAX)
+        return report(CODE_WRONG, "%s: the fields have %u units, and up to 255 are served", s->file,
+                      count);
+    s->id_count = (uint8_t)count;
+    return CODE_DONE;
+}
+
 static int make_units(serving *s, const device *from, served_hook *hook)
 {
     const int status =
-        s->file ? served_make_device(&s->units, from, hook)
+        s->file ? served_make_device(&s->units, from, s->ids, s->id_count, hook)
                 : served_make_units(&s->units, s->is_random ? SERVED_RANDOM : SERVED_ECHO, s->ids,
                                     s->id_count, hook);
 
@@ -557,16 +579,10 @@ int serve_command(int argc, char **argv)
     serving *s = &data;
     served_hook hook = {.before = before_request, .context = &s->line};
     device from = {0};
-    char wrong[YAML_FILE_WRONG_BYTES] = "";
-    int code = CODE_DONE;
+    int code;
 
     argp_parse(&parser, argc, argv, 0, NULL, s);
-    if (s->file)
-        code = device_file_read(&from, s->file, wrong);
-    if (code != CODE_DONE)
-        return report(code, "%s", wrong);
-    if (s->file && device_plan_check(&from, s->file, s->where.framing))
-        code = report(CODE_WRONG, "%s", device_plan_check(&from, s->file, s->where.framing));
+    code = s->file ? read_device(s, &from) : CODE_DONE;
     if (code == CODE_DONE)
         code = make_units(s, &from, &hook);
     if (code == CODE_DONE)

@@ -256,16 +256,26 @@ static void add_field(served_units *units, const device_field *field, const mbm_
     }
 }
 
-int served_make_device(served_units *units, const device *from, served_hook *hook)
+unsigned served_ids(const device *from, uint8_t ids[SERVED_IDS])
 {
-    uint8_t ids[256], is_known[256] = {0}, count = 0, table;
+    uint8_t is_known[SERVED_IDS] = {0};
+    unsigned count = 0, id;
     uint16_t i;
 
     for (i = 0; i < from->count; i++)
         is_known[from->planned[i].unit] = 1;
-    for (i = 0; i <= 255; i++)
-        if (is_known[i])
-            ids[count++] = (uint8_t)i;
+    for (id = 0; id < SERVED_IDS; id++)
+        if (is_known[id])
+            ids[count++] = (uint8_t)id;
+    return count;
+}
+
+int served_make_device(served_units *units, const device *from, const uint8_t *ids, uint8_t count,
+                       served_hook *hook)
+{
+    uint8_t table;
+    uint16_t i;
+
     if (begin(units, SERVED_DEVICE, ids, count, from->name, hook) != 0)
         return -1;
     units->from = from;

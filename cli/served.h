@@ -43,9 +43,15 @@ typedef struct served_units {
     mbm_object objects[3];
 } served_units;
 
-/* Makes the units of a device in the order of their ids, or `count` units with these ids. `from`
- * and `hook` must outlive them. Returns 0, or -1 without memory. */
-int served_make_device(served_units *units, const device *from, served_hook *hook);
+/* Finds the units that the fields of a device have, in ascending order. Returns how many there are.
+ */
+enum { SERVED_IDS = 256 };
+unsigned served_ids(const device *from, uint8_t ids[SERVED_IDS]);
+
+/* Makes `count` units with these ids: those of a device, or others. `from` and `hook` must outlive
+ * them. Returns 0, or -1 without memory. */
+int served_make_device(served_units *units, const device *from, const uint8_t *ids, uint8_t count,
+                       served_hook *hook);
 int served_make_units(served_units *units, enum served_kind kind, const uint8_t *ids, uint8_t count,
                       served_hook *hook);
 void served_free(served_units *units);

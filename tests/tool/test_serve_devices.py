@@ -9,7 +9,7 @@ import time
 
 import pytest
 from masters import QUIET, Asker, framed, mbpoll, outcome, port_of, pymodbus_client
-from peers import (CERTIFICATES, DONE, EXCEPTION, LINE, NO_REPLY, PATIENCE, PATIENT, READ, Client, Wire, number, tcp_frame, wait)
+from peers import (CERTIFICATES, DONE, EXCEPTION, LINE, NO_REPLY, PATIENCE, PATIENT, READ, WRONG, Client, Wire, number, tcp_frame, wait)
 
 TCP, UDP, RTU_OVER_TCP = "tcp://127.0.0.1:0", "udp://127.0.0.1:0", "rtu+tcp://127.0.0.1:0"
 BUSY = b"\x83\x06"
@@ -306,6 +306,14 @@ def test_requests_to_unit_0_count_for_faults_and_are_answered(client):
     assert [device.ask(0, pdu) for pdu in (write(0, 5), write(0, 6), write(1, 7, 8), read(0, 3))] == [
         write(0, 5), b"\x86\x06", b"\x10\0\1\0\2", b"\3\6\0\5\0\7\0\x08"]
     assert has_ended(device)
+
+
+def test_a_device_file_of_255_units_is_served_and_one_of_256_is_refused(mbm, write):
+    field = "- {{name: f{0}, table: holding, address: 0, type: uint16, unit: {0}, value: {0}}}\n".format
+    file = lambda units: write("units.yaml", "fields:\n" + "".join(map(field, units)))
+    place = mbm.serve(TCP, file(range(1, 256)))
+    assert [Client(port_of(place)).ask(unit) for unit in (1, 254)] == [number(1), number(254)]
+    mbm.fails(WRONG, "units.yaml: the fields have 256 units, and up to 255 are served.", "serve", TCP, file(range(256)))
 
 
 # --- the masters that suffer
