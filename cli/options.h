@@ -62,8 +62,7 @@ int options_word(const struct argp_state *state, const char *what, const char *t
                  const char *const *words);
 
 /* Reads unit ids from 0 to 255 such as 1,17,30-39, and puts them in ascending order. Returns how
- * many they are.
- */
+ * many there are. */
 enum { OPTIONS_UNITS = 256 };
 unsigned options_units(const struct argp_state *state, const char *what, const char *text,
                        uint8_t units[OPTIONS_UNITS]);
@@ -79,11 +78,11 @@ void options_wrong(const struct argp_state *state, const char *format, ...)
 void options_too_many(const struct argp_state *state, const char *text) __attribute__((noreturn));
 
 /* Refuses unit 0, unless it is a unit of Modbus TCP, or a client writes on a serial line. */
+void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
+
 /* Refuses unit 0 among units that are read, unless it is a unit of Modbus TCP. */
 void options_check_units(const struct argp_state *state, const struct place *where,
                          const uint8_t *units);
-
-void options_check_unit(const struct argp_state *state, const struct place *where, int is_write);
 
 /* Reads the LINE of a client, or of a server. */
 void options_place(const struct argp_state *state, struct place *where, const char *text,
