@@ -65,6 +65,22 @@ uint16_t device_mask(const mbm_planField *planned, uint32_t nth)
     return value_mask(planned->type, planned->order, planned->bit, (uint8_t)planned->count, nth);
 }
 
+int device_scale(const device *of, uint16_t power, const mbm_registers *registers,
+                 value_scale *scale)
+{
+    char text[VALUE_TEXT_BYTES];
+    long number;
+
+    if (conversion_print(&of->fields[power].form, registers, of->planned[power].address, 1, 0,
+                         text) != MBM_OK)
+        return 0;
+    number = strtol(text, NULL, 10);
+    if (number < -DEVICE_POWER || number > DEVICE_POWER)
+        return 0;
+    *scale = conversion_power((int)number);
+    return 1;
+}
+
 const char *device_label_of(const device *from, uint16_t field, const uint16_t *words)
 {
     const device_field *of = &from->fields[field];

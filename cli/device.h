@@ -107,6 +107,11 @@ mbm_planField device_read_as(const mbm_planField *planned);
 /* Returns the word of a register that has this number in the bits of a field. */
 uint16_t device_part(const mbm_planField *planned, uint16_t bits);
 
+/* Reads the power of ten that the field `power` has in registers, and sets the scale to it. Returns
+ * 0 if it has none, or one beyond DEVICE_POWER; `scale` stays then. */
+int device_scale(const device *of, uint16_t power, const mbm_registers *registers,
+                 value_scale *scale);
+
 /* Returns an address as the file writes addresses, in a buffer that the fourth next call of `say`
  * overwrites. */
 const char *device_address_text(const device *of, uint8_t table, uint32_t address);

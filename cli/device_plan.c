@@ -125,27 +125,18 @@ uint8_t device_plan_try(mbm_plan *plan, const mbm_planSetup *setup, uint16_t *wr
 uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value_form *form)
 {
     const int power = of->fields[field].power_field;
-    const mbm_planField *planned;
     mbm_registers registers;
-    char text[VALUE_TEXT_BYTES];
-    long number;
 
     *form = of->fields[field].form;
     if (power < 0)
         return MBM_OK;
-    planned = &of->planned[power];
     /* A power that failed to arrive lately is not used for a number that did arrive: if one request
      * reads both, they have one status. */
     if (mbm_plan_getRegisters(plan, (uint16_t)power, &registers) != MBM_OK ||
         (mbm_plan_getStatus(plan, (uint16_t)power, NULL) != MBM_OK &&
          mbm_plan_getStatus(plan, field, NULL) == MBM_OK) ||
-        conversion_print(&of->fields[power].form, &registers, planned->address, 1, 0, text) !=
-            MBM_OK)
+        !device_scale(of, (uint16_t)power, &registers, &form->scale))
         return MBM_NOT_AVAILABLE;
-    number = strtol(text, NULL, 10);
-    if (number < -DEVICE_POWER || number > DEVICE_POWER)
-        return MBM_NOT_AVAILABLE;
-    form->scale = conversion_power((int)number);
     return MBM_OK;
 }
 

@@ -304,22 +304,19 @@ static const char *check_power(const device *of, uint16_t field, uint16_t power)
     return NULL;
 }
 
-/* The power of ten that a field has in the file, 0 if that is none. */
-static int power_in_file(const device *of, uint16_t power)
+/* The scale that a field has in the file for others: 1 if it has none. */
+static value_scale scale_in_file(const device *of, uint16_t power)
 {
     const mbm_planField *planned = &of->planned[power];
+    value_scale scale = conversion_power(0);
     mbm_registers registers;
-    char text[VALUE_TEXT_BYTES];
-    long number;
 
     if (!of->fields[power].words)
-        return 0;
+        return scale;
     (void)mbm_registers_ofWords(&registers, of->fields[power].words, (uint16_t)device_size(planned),
-                                0);
-    if (conversion_print(&of->fields[power].form, &registers, 0, 1, 0, text) != MBM_OK)
-        return 0;
-    number = strtol(text, NULL, 10);
-    return number < -DEVICE_POWER || number > DEVICE_POWER ? 0 : (int)number;
+                                planned->address);
+    (void)device_scale(of, power, &registers, &scale);
+    return scale;
 }
 
 /* Returns the index of the field with a name, or -1. */
@@ -353,6 +350,6 @@ int device_values_find_power(yaml_file *file, device *of, uint16_t field)
                                      of->fields[power].name, of->fields[power].line, wrong);
     one->power_field = power;
     of->fields[power].is_power = 1;
-    one->form.scale = conversion_power(power_in_file(of, (uint16_t)power));
+    one->form.scale = scale_in_file(of, (uint16_t)power);
     return 1;
 }

@@ -230,17 +230,22 @@ int served_make_units(served_units *units, enum served_kind kind, const uint8_t 
     return begin(units, kind, ids, count, NULL, hook);
 }
 
-/* Adds a field to its unit. */
-static void add_field(served_units *units, const device_field *field, const mbm_planField *planned)
+served_cells *served_cells_of(const served_units *units, const mbm_planField *planned)
 {
-    const uint32_t size = device_size(planned);
-    served_cells *cells;
     uint8_t unit = 0;
-    uint32_t i;
 
     while (units->units[unit].id != planned->unit)
         unit++;
-    cells = &units->cells[unit][planned->table - 1];
+    return &units->cells[unit][planned->table - 1];
+}
+
+/* Adds a field to its unit. */
+static void add_field(served_units *units, const device_field *field, const mbm_planField *planned)
+{
+    served_cells *cells = served_cells_of(units, planned);
+    const uint32_t size = device_size(planned);
+    uint32_t i;
+
     for (i = 0; i < size; i++) {
         const uint16_t address = (uint16_t)(planned->address + i);
         const uint16_t mask = device_mask(planned, i);

@@ -56,4 +56,7 @@ int served_make_units(served_units *units, enum served_kind kind, const uint8_t 
                       served_hook *hook);
 void served_free(served_units *units);
 
+/* Returns the cells of the unit and table that a field of the device has. */
+served_cells *served_cells_of(const served_units *units, const mbm_planField *planned);
+
 #endif

@@ -3,18 +3,6 @@
  * Licence: MIT OR Apache-2.0. */
 #include "served_limits.h"
 
-#include <stdlib.h>
-
-/* The registers that a unit has in a table. */
-static const uint16_t *cells_of(const served_units *units, const mbm_planField *planned)
-{
-    uint8_t unit = 0;
-
-    while (units->units[unit].id != planned->unit)
-        unit++;
-    return units->cells[unit][planned->table - 1].values;
-}
-
 /* The form of a field, with the power of ten that its unit has now. */
 static value_form form_of(const served_units *units, uint16_t field)
 {
@@ -23,19 +11,14 @@ static value_form form_of(const served_units *units, uint16_t field)
     value_form form = of->fields[field].form;
     const mbm_planField *planned;
     mbm_registers registers;
-    char text[VALUE_TEXT_BYTES];
-    long number;
 
     if (power < 0)
         return form;
     planned = &of->planned[power];
-    (void)mbm_registers_ofWords(&registers, cells_of(units, planned) + planned->address,
-                                (uint16_t)device_size(planned), 0);
-    if (conversion_print(&of->fields[power].form, &registers, 0, 1, 0, text) != MBM_OK)
-        return form;
-    number = strtol(text, NULL, 10);
-    if (number >= -DEVICE_POWER && number <= DEVICE_POWER)
-        form.scale = conversion_power((int)number);
+    (void)mbm_registers_ofWords(&registers,
+                                served_cells_of(units, planned)->values + planned->address,
+                                (uint16_t)device_size(planned), planned->address);
+    (void)device_scale(of, (uint16_t)power, &registers, &form.scale);
     return form;
 }
 
