@@ -58,25 +58,23 @@ static uint8_t refusal_of(const fault_device *device, const fault_choice *chosen
                           const mbm_request *request)
 {
     const fault_list *list = &device->list;
-    int is_missing = chosen->has[FAULT_ONLY_FUNCTION], is_refused = 0, count, j;
+    int is_missing = 0, is_allowed = !chosen->has[FAULT_ONLY_FUNCTION], is_refused = 0, j;
     block blocks[2];
+    const int count = find_blocks(request, blocks);
     uint32_t i;
 
-    count = find_blocks(request, blocks);
     for (i = 0; i < list->count; i++) {
         const fault *one = &list->faults[i];
+        const int is_of_function = one->value == request->function;
 
         if (!fault_is_due(list, one))
             continue;
-        if (one->kind == FAULT_ONLY_FUNCTION && one->value == request->function)
-            is_missing = 0;
+        is_allowed |= one->kind == FAULT_ONLY_FUNCTION && is_of_function;
+        is_missing |= one->kind == FAULT_NO_FUNCTION && is_of_function;
         for (j = 0; j < count; j++)
             is_refused |= refuses_block(one, &blocks[j]);
     }
-    for (i = 0; i < list->count; i++)
-        if (list->faults[i].kind == FAULT_NO_FUNCTION && fault_is_due(list, &list->faults[i]))
-            is_missing |= list->faults[i].value == request->function;
-    if (is_missing)
+    if (is_missing || !is_allowed)
         return MBM_ILLEGAL_FUNCTION;
     if (is_refused)
         return chosen->has[FAULT_REFUSED_WITH] ? (uint8_t)chosen->value[FAULT_REFUSED_WITH]

@@ -274,12 +274,16 @@ static void send_due(fault_port *port)
 
 /* --- the port --- */
 
-/* Whether the connection was without a byte for too long. */
-static int is_idle(const fault_port *port)
+/* Returns the microseconds until the connection was idle for too long. */
+static uint32_t idle_delay(const fault_port *port)
 {
     const int64_t most = (int64_t)lasting(port, FAULT_CLOSE_IDLE) * 1000;
+    int64_t left;
 
-    return most > 0 && now_us() - port->activeUs >= most;
+    if (most == 0)
+        return UINT32_MAX;
+    left = port->activeUs + most - now_us();
+    return left > 0 ? (uint32_t)left : 0;
 }
 
 static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
@@ -290,7 +294,7 @@ static int16_t read_bytes(void *context, uint8_t *bytes, uint16_t capacity)
     if (port->is_lost)
         return -1;
     count = port->below.read(port->below.context, bytes, capacity);
-    if (count == 0 && is_idle(port))
+    if (count == 0 && idle_delay(port) == 0)
         lose(port);
     if (port->is_lost)
         return -1;
@@ -369,17 +373,14 @@ void fault_port_end(fault_port *port)
 
 uint32_t fault_port_delay(fault_port *port)
 {
-    const uint32_t passed = port->below.micros(port->below.context) - port->sinceUs;
+    uint32_t passed;
 
     /* The next read says so. */
     if (port->is_lost)
         return 0;
-    if (!fault_port_is_waiting(port)) {
-        const int64_t idle = (int64_t)lasting(port, FAULT_CLOSE_IDLE) * 1000,
-                      left = port->activeUs + idle - now_us();
-
-        return idle == 0 ? UINT32_MAX : left > 0 ? (uint32_t)left : 0;
-    }
+    if (!fault_port_is_waiting(port))
+        return idle_delay(port);
+    passed = port->below.micros(port->below.context) - port->sinceUs;
     /* The port below accepts no bytes now. */
     return passed < port->pauseUs ? port->pauseUs - passed : 1000;
 }

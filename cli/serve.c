@@ -341,9 +341,12 @@ static void rest(serve_line *l)
     uint32_t delay = REST;
     int i;
 
-    for (i = 0; i < l->count; i++)
-        if (is_used(l, i) && delay_of(l, i) < delay)
-            delay = delay_of(l, i);
+    for (i = 0; i < l->count; i++) {
+        const uint32_t due = is_used(l, i) ? delay_of(l, i) : REST;
+
+        if (due < delay)
+            delay = due;
+    }
     if (l->at.kind == PLACE_UDP)
         (void)mbm_udp_wait(&l->udp, 1, -1, delay);
     else if (l->at.kind == PLACE_TLS)
