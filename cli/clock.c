@@ -18,6 +18,11 @@ int64_t clock_milliseconds(void)
     return (int64_t)(clock_micros(CLOCK_MONOTONIC) / 1000u);
 }
 
+struct timespec clock_timespec(uint32_t micros)
+{
+    return (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+}
+
 const char *clock_text(uint64_t micros, int digits, char text[CLOCK_TEXT_BYTES])
 {
     const time_t seconds = (time_t)(micros / 1000000u);

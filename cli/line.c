@@ -447,7 +447,7 @@ static void wait_tty(line *l, int fd, uint32_t micros)
 {
     const int is_waiting = l->tty.isOpen && mbm_client_pending(&l->client) > 0;
     struct pollfd waits[2] = {{fd, POLLIN, 0}, {is_waiting ? l->tty.fd : -1, POLLIN, 0}};
-    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    const struct timespec time = clock_timespec(micros);
 
     if (fd < 0)
         (void)mbm_tty_wait(&l->tty, micros);

@@ -90,26 +90,28 @@ static void draw_if_due(live *l)
     l->is_new = 0;
 }
 
+static uint32_t sooner(uint32_t one, uint32_t other)
+{
+    return one < other ? one : other;
+}
+
 /* How long to wait at most, in microseconds. */
 static uint32_t time_left(live *l, uint32_t milliseconds)
 {
     const int64_t draw = l->drawn_at + (l->is_new ? SOON_MS : AGES_MS) - clock_milliseconds();
-    uint32_t micros = milliseconds < 1000 ? milliseconds * 1000 : 1000000;
+    uint32_t micros = sooner(milliseconds, 1000) * 1000;
 
-    if (line_delay(&l->of->at) < micros)
-        micros = line_delay(&l->of->at);
-    if (http_delay(&l->page.http) < micros)
-        micros = http_delay(&l->page.http);
-    if (l->watches && draw * 1000 < micros)
-        micros = draw > 0 ? (uint32_t)draw * 1000 : 0;
+    micros = sooner(micros, line_delay(&l->of->at));
+    micros = sooner(micros, http_delay(&l->page.http));
+    if (l->watches)
+        micros = sooner(micros, draw > 0 ? (uint32_t)draw * 1000 : 0);
     return micros;
 }
 
 void live_wait(live *l, uint32_t milliseconds)
 {
     struct pollfd polls[2 + HTTP_WAITS];
-    const uint32_t micros = time_left(l, milliseconds);
-    const struct timespec time = {(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    const struct timespec time = clock_timespec(time_left(l, milliseconds));
     nfds_t count = 0, before;
 
     if (l->watches)

@@ -341,7 +341,7 @@ int service_wait(service *s, struct pollfd *polls, nfds_t count, uint32_t micros
             micros = (uint32_t)(left * 1000);
     }
     added = http_wait(&s->metrics, polls + count);
-    time = (struct timespec){(time_t)(micros / 1000000u), (long)(micros % 1000000u) * 1000};
+    time = clock_timespec(micros);
     found = ppoll(polls, count + added, micros == UINT32_MAX ? NULL : &time, &s->awake);
     if (found > 0)
         http_polled(&s->metrics, polls + count, added);
