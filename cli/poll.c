@@ -15,8 +15,6 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { LONGEST_NAME = 40 };
-
 typedef struct polling {
     /* What the command line says. */
     place where;
@@ -179,21 +177,12 @@ static void show_plan(polling *p)
 
 /* --- showing --- */
 
-static int longest_name(polling *p)
-{
-    int longest = 0;
-    uint16_t i;
-
-    for (i = 0; i < p->read.meter.readable; i++)
-        if (screen_width(p->read.meter.fields[i].name) > longest)
-            longest = screen_width(p->read.meter.fields[i].name);
-    return longest < LONGEST_NAME ? longest : LONGEST_NAME;
-}
-
 /* Prints a text in a column. */
 static void print_column(const char *text, int width)
 {
-    printf("  %s%*s", text, width > screen_width(text) ? width - screen_width(text) : 0, "");
+    const int taken = screen_width(text);
+
+    printf("  %s%*s", text, width > taken ? width - taken : 0, "");
 }
 
 static void print_row(polling *p, uint16_t field, int name_width)
@@ -215,15 +204,13 @@ static void print_row(polling *p, uint16_t field, int name_width)
 
 static void print_rows(polling *p, uint32_t round, const char *time)
 {
-    const int name_width = longest_name(p);
-    uint16_t i, right = 0;
+    const int name_width = polled_name_width(&p->read);
+    uint16_t i;
 
-    for (i = 0; i < p->read.meter.readable; i++)
-        right = (uint16_t)(right + (mbm_plan_getStatus(&p->read.plan, i, NULL) == MBM_OK));
     if (isatty(STDOUT_FILENO))
         printf("\033[H\033[J");
-    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time, right,
-           p->read.meter.readable);
+    printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time,
+           polled_read_count(&p->read), p->read.meter.readable);
     for (i = 0; i < p->read.meter.readable; i++)
         print_row(p, i, name_width);
 }

@@ -4,10 +4,34 @@
 #include "polled.h"
 
 #include "report.h"
+#include "screen.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <string.h>
+
+int polled_name_width(const polled *p)
+{
+    int longest = 0;
+    uint16_t i;
+
+    for (i = 0; i < p->meter.readable; i++) {
+        const int width = screen_width(p->meter.fields[i].name);
+
+        if (width > longest)
+            longest = width;
+    }
+    return longest < POLLED_LONGEST_NAME ? longest : POLLED_LONGEST_NAME;
+}
+
+uint16_t polled_read_count(polled *p)
+{
+    uint16_t i, right = 0;
+
+    for (i = 0; i < p->meter.readable; i++)
+        right = (uint16_t)(right + (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_OK));
+    return right;
+}
 
 uint8_t polled_exception(uint8_t status)
 {

@@ -16,6 +16,14 @@ typedef struct polled {
     mbm_planSplitting splitting;
 } polled;
 
+/* How many columns of a table the names take: those of the longest one, up to POLLED_LONGEST_NAME.
+ */
+enum { POLLED_LONGEST_NAME = 40 };
+int polled_name_width(const polled *p);
+
+/* How many fields have been read, and their last read has ended well. */
+uint16_t polled_read_count(polled *p);
+
 /* The code of an exception, or 0 for another status. */
 uint8_t polled_exception(uint8_t status);
 

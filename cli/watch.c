@@ -15,9 +15,9 @@
 /* A value is marked for so long after it has changed. */
 enum { MARKED_MS = 3000 };
 /* Lines beside those of fields: the title and the heads above, units and keys below. */
-enum { ABOVE = 2, BELOW = 2, LONGEST_NAME = 40, LONGEST_VALUE = 32, LONGEST_NUMBER = 16 };
-/* A screen of less lines has none below, and one of less columns no status. */
-enum { FEW_LINES = 6, FEW_COLUMNS = 40 };
+enum { ABOVE = 2, BELOW = 2, LONGEST_VALUE = 32, LONGEST_NUMBER = 16 };
+/* A screen of less lines has no heads, and none below. */
+enum { FEW_LINES = 6 };
 
 #define BOLD "\033[1m"
 #define DIM "\033[2m"
@@ -123,14 +123,10 @@ static int more(int a, int b)
 static void choose_widths(watch *w, drawing *d)
 {
     static const enum column DROPPED[] = {UNIT, CHANGED, LEAST, MOST, AGE, STATUS};
-    const polled *of = w->of->of;
-    int *widths = d->widths, name = screen_width(HEADS[NAME]), total = 0, i;
-    uint16_t field;
+    int *widths = d->widths, total = 0, i;
 
-    for (field = 0; field < of->meter.readable; field++)
-        name = more(name, screen_width(of->meter.fields[field].name));
     widths[MARK] = 1;
-    widths[NAME] = name < LONGEST_NAME ? name : LONGEST_NAME;
+    widths[NAME] = more(screen_width(HEADS[NAME]), polled_name_width(w->of->of));
     widths[VALUE] = more(w->value_width, 12);
     widths[UNIT] = w->of->unit_count > 1 ? 4 : 0;
     widths[AGE] = 5;
@@ -226,10 +222,8 @@ static void draw_field(watch *w, drawing *d, uint16_t field)
 static void draw_title(watch *w, drawing *d)
 {
     polled *of = w->of->of;
-    uint16_t i, right = 0;
+    const uint16_t right = polled_read_count(of);
 
-    for (i = 0; i < of->meter.readable; i++)
-        right = (uint16_t)(right + (mbm_plan_getStatus(&of->plan, i, NULL) == MBM_OK));
     style(d, BOLD);
     if (of->meter.name)
         say_there(d, "%s  ", of->meter.name);
