@@ -5,7 +5,7 @@
 
 use super::field::{Field, DOUBLE, FLOAT, INT32, TEXT};
 use super::number::{parts, ONE};
-use super::value::{scale, Words};
+use super::value::{scale, signed, Words};
 use super::wide::Wide;
 use crate::data::arithmetic::times_small;
 use crate::error::Error;
@@ -163,17 +163,8 @@ impl Words<'_> {
         } else {
             (offset - number, !is_below)
         };
-        let rounded = quotient(sum, denominator);
-        if rounded > i32::MAX as u64 + u64::from(is_below) {
-            return Err(Error::OUT_OF_RANGE);
-        }
-        let rounded = rounded as u32;
-        Ok(if is_below {
-            rounded.wrapping_neg()
-        } else {
-            rounded
-        }
-        .cast_signed())
+        let rounded = u32::try_from(quotient(sum, denominator));
+        signed(rounded.map_err(|_| Error::OUT_OF_RANGE)?, is_below)
     }
 }
 

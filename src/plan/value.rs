@@ -233,16 +233,25 @@ impl Words<'_> {
             return Err(Error::OUT_OF_RANGE);
         }
         let (scaled, _) = divide(raw * multiplier + half, divisor);
-        if scaled > i32::MAX as u32 + u32::from(is_below) {
-            return Err(Error::OUT_OF_RANGE);
-        }
-        Ok(if is_below {
-            scaled.wrapping_neg()
-        } else {
-            scaled
-        }
-        .cast_signed())
+        signed(scaled, is_below)
     }
+}
+
+/// The integer with this magnitude.
+///
+/// # Errors
+/// [`Error::OUT_OF_RANGE`]
+#[inline(always)]
+pub(super) fn signed(magnitude: u32, is_below: bool) -> Result<i32, Error> {
+    if magnitude > i32::MAX as u32 + u32::from(is_below) {
+        return Err(Error::OUT_OF_RANGE);
+    }
+    Ok(if is_below {
+        magnitude.wrapping_neg()
+    } else {
+        magnitude
+    }
+    .cast_signed())
 }
 
 /// `magnitude` times the sum of `whole` and `part / divisor`, rounded to the nearest, halves
