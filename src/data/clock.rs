@@ -112,6 +112,11 @@ impl<'a> Layout<'a> {
         })
     }
 
+    /// True if there is such a date, and if it has a day exactly if the layout has one.
+    fn is_for(&self, date: &Date) -> bool {
+        date.exists() && date.is_time_only() != self.text.contains(&b'M')
+    }
+
     /// The date that has these parts.
     fn date(&self, parts: &[u16; PARTS]) -> Result<Date, Error> {
         let [_, year, since_2000, since_1900, century, month, day, hour, minute, second, millisecond] =
@@ -139,7 +144,7 @@ impl<'a> Layout<'a> {
             second: byte(second),
             flags: 0,
         };
-        if !date.exists() || date.is_time_only() == self.text.contains(&b'M') {
+        if !self.is_for(&date) {
             return Err(Error::MALFORMED_VALUE);
         }
         Ok(date)
@@ -147,7 +152,7 @@ impl<'a> Layout<'a> {
 
     /// The parts of a date.
     fn parts(&self, date: &Date) -> Result<[u16; PARTS], Error> {
-        if !date.exists() || date.is_time_only() == self.text.contains(&b'M') {
+        if !self.is_for(date) {
             return Err(Error::INVALID_ARGUMENT);
         }
         let mut parts = [0; PARTS];
@@ -224,6 +229,7 @@ impl<C: RegisterBytes> Registers<C> {
         let word = |place: u16| self.get_in::<u16>(order, address.wrapping_add(place));
         let (year, days, minutes) = (word(year)?, word(days)?, word(minutes)?);
         let milliseconds = if count == 4 { word(milliseconds)? } else { 0 };
+        let flag = |bit: u16, flag: u8| if minutes & bit == 0 { 0 } else { flag };
         let date = Date {
             year: 2000 + (year & 0x7F),
             millisecond: milliseconds % 1000,
@@ -232,11 +238,7 @@ impl<C: RegisterBytes> Registers<C> {
             hour: (minutes >> 8 & 0x1F) as u8,
             minute: (minutes & 0x3F) as u8,
             second: (milliseconds / 1000) as u8,
-            flags: (if minutes & 0x8000 == 0 {
-                0
-            } else {
-                SUMMER_TIME
-            }) | (if minutes & 0x80 == 0 { 0 } else { UNRELIABLE }),
+            flags: flag(0x8000, SUMMER_TIME) | flag(0x80, UNRELIABLE),
         };
         if date.exists() {
             Ok(date)
