@@ -1,9 +1,9 @@
 //! Accepts a reply on a serial line that deviates from the standard: see
 //! `src/client/request/deviation.rs`.
 //!
-//! The search has not taken such a reply. It ends the request once the line is silent, so that a
-//! right reply that follows it wins. A unit that owes replies to earlier requests may have sent it
-//! late: then it is held, as a right one is.
+//! The search does not take such a reply. The reply ends the request once the line is silent, so
+//! that a right reply that follows it wins. If its unit owes replies to earlier requests, it may be a
+//! late one: then it is held, as a right one is.
 //!
 //! Only [`Serial::set_lenient`] names this module. A program that does not call that function
 //! contains none of this code.

@@ -1,8 +1,9 @@
 //! The order of a value's bytes in registers.
 
-/// The order in which a device sends the bytes of a value of two registers: A is the most
-/// significant byte, D the least significant. A value of four registers is ordered in the
-/// same way, or, in the last four orders, by halves of two registers.
+/// The order in which a device sends the bytes of a value. A is the most significant byte. The
+/// least significant one is D in two registers and H in four. The first four orders are named by
+/// what they make of two registers; they order four registers in the same way. The last four are
+/// named by what they make of four registers, which they order by halves of two.
 ///
 /// The standard defines the byte order of one register, high byte first. It defines no
 /// order for values of several registers, so devices use each of these.
@@ -60,8 +61,8 @@ impl Order {
         self as usize & size.wrapping_sub(1)
     }
 
-    /// Where register `nth` of a value of `count` registers (1 to 4) is among them; 0 is the most
-    /// significant. `None` if the order does not say it: one by halves, for three registers.
+    /// Where register `nth` of a value of `count` registers (1 to 4) is among them. Register 0 is the
+    /// most significant. `None` if the order does not say it: one by halves, for three registers.
     pub const fn place(self, nth: u16, count: u16) -> Option<u16> {
         let words = self as u16 >> 1;
         if count == 3 {
