@@ -58,6 +58,11 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
         self.client_request.as_ref().map(J::state)
     }
 
+    /// Length of the request PDU; 0 if there is no request.
+    fn request_length(&self) -> u8 {
+        self.state().map_or(0, RequestState::request_length)
+    }
+
     /// Writes the request PDU.
     fn emit(&self, pdu: &mut [u8]) {
         let Some(client_request) = &self.client_request else {
@@ -102,7 +107,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     }
 
     fn fits(&self, space: u16) -> bool {
-        let length = self.state().map_or(0, RequestState::request_length);
+        let length = self.request_length();
         let frame = match self.ascii {
             Some(_) => ascii::frame_length(length),
             None => u16::from(length) + rtu::OVERHEAD as u16,
@@ -192,12 +197,7 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
 
 /// Writes the frame of the request.
 fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, J>) {
-    let length = u16::from(
-        engine
-            .request
-            .state()
-            .map_or(0, RequestState::request_length),
-    );
+    let length = u16::from(engine.request.request_length());
     engine.storage.set_byte(0, engine.unit);
     engine.request.emit(engine.storage.bytes(1, length));
     let content = length + 1;
