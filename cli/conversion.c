@@ -180,11 +180,9 @@ uint16_t conversion_read(const value_form *form, const char *text, size_t length
 
 static const char *limit_text(const value_scale *limit)
 {
-    static decimal_number number;
     char text[DECIMAL_BYTES];
 
-    decimal_of_scale(limit, &number);
-    decimal_print(&number, 0, text);
+    decimal_print_scale(limit, text);
     return say("%s", text);
 }
 

@@ -66,23 +66,30 @@ int decimal_read(const char *text, size_t length, decimal_number *number)
     return 1;
 }
 
+int decimal_shorten(const decimal_number *number, value_scale *scale)
+{
+    char text[VALUE_LONGEST + 1];
+    size_t at;
+
+    if (number->count > SHORT_DIGITS)
+        return 0;
+    scale->digits = 0;
+    for (at = 0; at < number->count; at++)
+        scale->digits = scale->digits * 10 + number->digits[at];
+    scale->exponent = number->exponent;
+    scale->is_negative = (uint8_t)number->is_negative;
+    (void)decimal_print_exact(number, text);
+    scale->value = strtod(text, NULL);
+    return 1;
+}
+
 int decimal_read_short(const char *text, value_scale *number)
 {
     static decimal_number read;
-    size_t at;
 
     memset(number, 0, sizeof *number);
-    if (!decimal_read(text, strlen(text), &read))
-        return 0;
-    if (read.count > SHORT_DIGITS || read.exponent < -SHORT_DIGITS ||
-        read.exponent + (long)read.count > SHORT_DIGITS)
-        return 0;
-    for (at = 0; at < read.count; at++)
-        number->digits = number->digits * 10 + read.digits[at];
-    number->exponent = read.exponent;
-    number->is_negative = (uint8_t)read.is_negative;
-    number->value = strtod(text, NULL);
-    return 1;
+    return decimal_read(text, strlen(text), &read) && read.exponent >= -SHORT_DIGITS &&
+           read.exponent + (long)read.count <= SHORT_DIGITS && decimal_shorten(&read, number);
 }
 
 void decimal_of_scale(const value_scale *scale, decimal_number *number)
@@ -224,6 +231,28 @@ int decimal_compare(const decimal_number *one, const value_scale *other)
     return a.is_negative ? -order : order;
 }
 
+int decimal_divide(const decimal_number *number, uint64_t divisor, uint64_t *quotient,
+                   int *has_rest)
+{
+    const long before_point = (long)number->count + number->exponent;
+    uint64_t rest = 0;
+    long at;
+
+    *quotient = 0;
+    for (at = 0; at < before_point; at++) {
+        uint64_t next;
+
+        rest = rest * 10 + ((size_t)at < number->count ? number->digits[at] : 0u);
+        next = rest / divisor;
+        rest %= divisor;
+        if (*quotient > (UINT64_MAX - next) / 10)
+            return 0;
+        *quotient = *quotient * 10 + next;
+    }
+    *has_rest = rest > 0 || (number->count > 0 && number->exponent < 0);
+    return 1;
+}
+
 int decimal_is_multiple(const decimal_number *number, const value_scale *step)
 {
     const uint64_t digits = step->digits;
@@ -303,6 +332,14 @@ void decimal_print(const decimal_number *number, unsigned places, char text[DECI
         *to++ = (char)('0' + (from_right < 0 ? 0 : digit_at(number, (size_t)from_right)));
     }
     *to = '\0';
+}
+
+void decimal_print_scale(const value_scale *scale, char text[DECIMAL_BYTES])
+{
+    static decimal_number number;
+
+    decimal_of_scale(scale, &number);
+    decimal_print(&number, 0, text);
 }
 
 int decimal_print_exact(const decimal_number *number, char text[VALUE_LONGEST + 1])

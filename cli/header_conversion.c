@@ -43,11 +43,9 @@ static int is_converted(const device_field *field)
 
 void header_write_number(FILE *out, const char *before, const value_scale *number)
 {
-    static decimal_number decimal;
     char text[DECIMAL_BYTES];
 
-    decimal_of_scale(number, &decimal);
-    decimal_print(&decimal, 0, text);
+    decimal_print_scale(number, text);
     fprintf(out, "%s%s", before, text);
 }
 

@@ -45,21 +45,9 @@ typedef struct whole {
 static int divide(const decimal_number *number, int32_t divisor, whole *result)
 {
     const uint64_t by = (uint64_t)(divisor < 0 ? -(int64_t)divisor : divisor);
-    const long digits = (long)number->count + number->exponent;
-    uint64_t rest = 0;
-    long at;
 
-    result->amount = 0;
     result->is_negative = number->is_negative != (divisor < 0);
-    for (at = 0; at < digits; at++) {
-        rest = rest * 10 + ((size_t)at < number->count ? number->digits[at] : 0u);
-        if (result->amount > (UINT64_MAX - 9) / 10)
-            return 0;
-        result->amount = result->amount * 10 + rest / by;
-        rest %= by;
-    }
-    result->has_rest = rest > 0 || (number->count > 0 && number->exponent < 0);
-    return 1;
+    return decimal_divide(number, by, &result->amount, &result->has_rest);
 }
 
 /* Finds the limit as the registers have it, of a number that is divided by `multiplier` then.

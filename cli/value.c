@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "value.h"
 
+#include "decimal.h"
 #include "numbers.h"
 #include "value_dates.h"
 
@@ -14,11 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* SCALE_DIGITS: a remainder of a division by the scale, with one more digit, fits in 64 bits.
- * RANGE_DIGITS: a number with more digits is out of range, whatever the scale is.
- * FAR: an exponent beyond it makes each number too large or too small for all types. */
-enum { SCALE_DIGITS = 18, RANGE_DIGITS = SCALE_DIGITS + 20, FAR = 100000 };
-
 const char *const value_table_names[] = {"", "coils", "discrete", "holding", "input", NULL};
 const char *const value_order_names[] = {"",         "ABCD",     "CDAB",     "BADC",     "DCBA",
                                          "EFGHABCD", "CDABGHEF", "FEHGBADC", "DCBAHGFE", NULL};
@@ -26,74 +22,13 @@ const char *const value_order_names[] = {"",         "ABCD",     "CDAB",     "BA
 static const char OUT_OF_RANGE[] = "is out of range";
 static const value_scale ONE = {.digits = 1, .value = 1};
 
-/* A number: digits * 10^exponent. The digits neither begin nor end with 0. Zero has none. */
-typedef struct decimal {
-    char digits[VALUE_LONGEST];
-    size_t count;
-    long exponent;
-    int is_negative;
-} decimal;
-
-/* Reads all bytes as one number. */
-static int read_decimal(cursor in, decimal *number)
-{
-    const cursor all = in;
-    long exponent = 0;
-    int is_fraction = 0;
-
-    memset(number, 0, sizeof *number);
-    if (!cursor_skip_number(&in) || in.at != in.end || all.end - all.at > VALUE_LONGEST)
-        return 0;
-    in = all;
-    number->is_negative = cursor_skip_char(&in, '-');
-    for (; cursor_is_digit(&in) || (in.at < in.end && *in.at == '.'); in.at++) {
-        if (*in.at == '.') {
-            is_fraction = 1;
-            continue;
-        }
-        number->exponent -= is_fraction;
-        if (number->count > 0 || *in.at != '0')
-            number->digits[number->count++] = *in.at;
-    }
-    while (number->count > 0 && number->digits[number->count - 1] == '0') {
-        number->count--;
-        number->exponent++;
-    }
-    if (in.at < in.end) {
-        int is_negative;
-
-        in.at++;
-        is_negative = cursor_skip_char(&in, '-');
-        if (!is_negative)
-            (void)cursor_skip_char(&in, '+');
-        while (cursor_is_digit(&in)) {
-            if (exponent < FAR)
-                exponent = exponent * 10 + (*in.at - '0');
-            in.at++;
-        }
-        number->exponent += is_negative ? -exponent : exponent;
-    }
-    return 1;
-}
-
 int value_scale_read(const char *text, value_scale *scale)
 {
-    const cursor all = {text, text + strlen(text)};
-    decimal number;
-    size_t at;
+    decimal_number number;
 
-    if (!read_decimal(all, &number) || number.count == 0 || number.count > SCALE_DIGITS)
-        return 0;
-    scale->value = strtod(text, NULL);
-    /* Too large or too small for a double. */
-    if (!isfinite(scale->value) || scale->value == 0)
-        return 0;
-    scale->digits = 0;
-    for (at = 0; at < number.count; at++)
-        scale->digits = scale->digits * 10 + (uint64_t)(number.digits[at] - '0');
-    scale->exponent = number.exponent;
-    scale->is_negative = (uint8_t)number.is_negative;
-    return 1;
+    /* A value of infinity or 0 is too large or too small for a double. */
+    return decimal_read(text, strlen(text), &number) && number.count > 0 &&
+           decimal_shorten(&number, scale) && isfinite(scale->value) && scale->value != 0;
 }
 
 static int is_one(const value_scale *scale)
@@ -101,35 +36,22 @@ static int is_one(const value_scale *scale)
     return scale->digits == 1 && scale->exponent == 0 && !scale->is_negative;
 }
 
-/* Divides a number by a scale, digit by digit. Returns NULL and the quotient without its sign, or
- * why the number is refused. */
-static const char *divide(const decimal *number, const value_scale *scale, uint64_t *quotient)
+/* Divides a number by a scale. Returns NULL and the quotient without its sign, or why the number is
+ * refused. */
+static const char *divide(const decimal_number *number, const value_scale *scale,
+                          uint64_t *quotient)
 {
     const char *wrong = is_one(scale) ? "is not a whole number" : "is not a multiple of the scale";
-    const long count = (long)number->count;
-    /* The zeros that follow the digits of the number. */
-    const long zeros = count > 0 ? number->exponent - scale->exponent : 0;
-    uint64_t remainder = 0;
-    long at;
+    decimal_number scaled = *number;
+    int has_rest;
 
-    *quotient = 0;
-    /* The digits of the number do not end with 0, so no integer times 10 has them. */
-    if (zeros < 0)
+    scaled.exponent -= scale->exponent;
+    /* The digits of a number do not end with 0, so no integer times 10 has them. */
+    if (scaled.count > 0 && scaled.exponent < 0)
         return wrong;
-    if (count + zeros > RANGE_DIGITS)
+    if (!decimal_divide(&scaled, scale->digits, quotient, &has_rest))
         return OUT_OF_RANGE;
-    for (at = 0; at < count + zeros; at++) {
-        const int digit = at < count ? number->digits[at] - '0' : 0;
-        uint64_t next;
-
-        remainder = remainder * 10 + (uint64_t)digit;
-        next = remainder / scale->digits;
-        remainder %= scale->digits;
-        if (*quotient > (UINT64_MAX - next) / 10)
-            return OUT_OF_RANGE;
-        *quotient = *quotient * 10 + next;
-    }
-    return remainder == 0 ? NULL : wrong;
+    return has_rest ? wrong : NULL;
 }
 
 /* The greatest number of wide bits. */
@@ -140,7 +62,7 @@ static uint64_t mask_of(const value_form *form)
 
 /* Converts a number to the integer of a field, as two's complement. Returns NULL, or why it is
  * refused. */
-static const char *to_integer(const decimal *number, const value_scale *scale,
+static const char *to_integer(const decimal_number *number, const value_scale *scale,
                               const value_form *form, uint64_t *integer)
 {
     const value_range range = value_is_wide_bits(form->type) ? (value_range){0, mask_of(form)}
@@ -186,27 +108,24 @@ static int to_half(double real, uint16_t *word, uint8_t order)
 
 /* Whether a float that was made of an integer without a scale is that integer. Numbers with a point
  * or an exponent are rounded instead. */
-static int is_same_integer(cursor in, const decimal *number, double real)
+static int is_same_integer(cursor in, const decimal_number *number, double real)
 {
     char digits[VALUE_LONGEST * 3];
-    cursor text;
-    decimal other;
+    decimal_number other;
 
     for (; in.at < in.end; in.at++)
         if (!cursor_is_digit(&in) && *in.at != '-')
             return 1;
     (void)snprintf(digits, sizeof digits, "%.0f", real);
-    text.at = digits;
-    text.end = digits + strlen(digits);
-    return strlen(digits) <= VALUE_LONGEST && read_decimal(text, &other) &&
-           other.count == number->count && other.exponent == number->exponent &&
+    return decimal_read(digits, strlen(digits), &other) && other.count == number->count &&
+           other.exponent == number->exponent &&
            memcmp(other.digits, number->digits, number->count) == 0;
 }
 
 /* Converts a number to the nearest float of a type. Returns NULL; or why it is refused: if it is
  * too large, if it is not 0 but becomes 0, or if it is an integer that the float is not. */
-static const char *to_real(cursor in, const decimal *number, const value_scale *scale, uint8_t type,
-                           double *real)
+static const char *to_real(cursor in, const decimal_number *number, const value_scale *scale,
+                           uint8_t type, double *real)
 {
     const double most = type == MBM_TYPE_FLOAT ? (double)FLT_MAX : DBL_MAX;
     char text[VALUE_LONGEST + 1];
@@ -292,7 +211,7 @@ uint16_t value_read(const value_form *form, const char *text, size_t length,
     const value_scale *scale = form->scale.digits ? &form->scale : &ONE;
     const cursor in = {text, text + length};
     uint64_t integer = 0;
-    decimal number;
+    decimal_number number;
     double real = 0;
 
     *wrong = NULL;
@@ -300,7 +219,7 @@ uint16_t value_read(const value_form *form, const char *text, size_t length,
         return value_date_read(form, text, length, words, wrong);
     if (form->is_hex)
         *wrong = read_hex(in, form->type, &integer);
-    else if (length > VALUE_LONGEST || !read_decimal(in, &number))
+    else if (!decimal_read(text, length, &number))
         *wrong = "is not a decimal number";
     else if (value_is_float(form->type))
         *wrong = to_real(in, &number, scale, form->type, &real);
