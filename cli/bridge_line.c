@@ -401,9 +401,7 @@ static uint8_t write_part(bridge_line *l, bridge_write *write, const value_form 
                           const mbm_planField *planned, const broker_event *event,
                           const char **wrong)
 {
-    const value_form form = {.type = planned->count == 1 ? MBM_TYPE_BIT : MBM_TYPE_UINT16,
-                             .order = MBM_ORDER_ABCD,
-                             .conversion = as->conversion};
+    const value_form form = device_bits_form(planned, as);
     uint16_t bits[VALUE_WORDS] = {0};
 
     if (payload_parse(&form, event->bytes + event->name_bytes, event->length, bits, wrong) == 0)

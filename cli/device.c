@@ -138,6 +138,15 @@ int device_find(const device *from, const char *topic)
     return -1;
 }
 
+value_form device_bits_form(const mbm_planField *planned, const value_form *own)
+{
+    const int is_number = planned->count > 1 && device_is_part(planned);
+
+    return (value_form){.type = is_number ? MBM_TYPE_UINT16 : MBM_TYPE_BIT,
+                        .order = MBM_ORDER_ABCD,
+                        .conversion = own->conversion};
+}
+
 const char *device_address_text(const device *of, uint8_t table, uint32_t address)
 {
     static const unsigned DIGITS[] = {0, 0, 1, 4, 3}; /* of each table */

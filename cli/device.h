@@ -107,6 +107,10 @@ mbm_planField device_read_as(const mbm_planField *planned);
 /* Returns the word of a register that has this number in the bits of a field. */
 uint16_t device_part(const mbm_planField *planned, uint16_t bits);
 
+/* Returns the form of bits as one number, whose conversion is that of the form of their field: a
+ * bit, or a whole number if they are several bits of a register. */
+value_form device_bits_form(const mbm_planField *planned, const value_form *own);
+
 /* Reads the power of ten that the field `power` has in registers, and sets the scale to it. Returns
  * 0 if it has none, or one beyond DEVICE_POWER; `scale` stays then. */
 int device_scale(const device *of, uint16_t power, const mbm_registers *registers,

@@ -144,12 +144,10 @@ uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value
 static uint8_t print_bits(const mbm_planField *planned, const value_form *form, int64_t integer,
                           int is_json, char text[VALUE_TEXT_BYTES])
 {
-    const int is_number = planned->count > 1 && device_is_part(planned);
-    value_form as = {.type = is_number ? MBM_TYPE_UINT16 : MBM_TYPE_BIT, .order = MBM_ORDER_ABCD};
+    const value_form as = device_bits_form(planned, form);
     uint16_t bits = (uint16_t)integer;
     mbm_registers registers;
 
-    as.conversion = is_number ? form->conversion : NULL;
     (void)mbm_registers_ofWords(&registers, &bits, 1, 0);
     return conversion_print(&as, &registers, 0, 1, is_json, text);
 }

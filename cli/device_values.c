@@ -163,7 +163,7 @@ static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
                       const mbm_planField *planned, device_field *field)
 {
     const char *text = yaml_file_text(file, "not_available", node, VALUE_LONGEST);
-    value_form form = field->form;
+    const value_form form = is_bit(planned) ? device_bits_form(planned, &field->form) : field->form;
     conversion *of = field->conversion;
     const char *wrong;
     int is_hex;
@@ -173,11 +173,6 @@ static int add_number(yaml_file *file, const yaml_node_t *node, int is_shared,
     if (strcmp(text, STANDARD) == 0) {
         of->is_standard = 1;
         return 1;
-    }
-    if (is_bit(planned)) {
-        /* Several bits are one number, whatever the order of the field is. */
-        form.type = MBM_TYPE_UINT16;
-        form.order = MBM_ORDER_ABCD;
     }
     is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
     if (value_is_text(planned->type) ||

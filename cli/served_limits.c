@@ -43,8 +43,7 @@ static int is_allowed(const served_cells *cells, uint16_t field, const mbm_acces
     if (device_is_part(planned)) {
         (void)mbm_registers_getUint16(&registers, 0, planned->order, &words[0]);
         words[0] = (uint16_t)(words[0] >> planned->bit & ((1u << planned->count) - 1));
-        form.type = MBM_TYPE_UINT16;
-        form.order = MBM_ORDER_ABCD;
+        form = device_bits_form(planned, &form);
     }
     each = value_registers(form.type, 1);
     for (i = 0; i < size; i = (uint16_t)(i + each))
