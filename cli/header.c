@@ -457,24 +457,6 @@ static int write_header(job *j, header *h)
     return 1;
 }
 
-/* Writes the text to where it is wanted. Returns the exit code. */
-static int keep(job *j, const char *text, size_t length)
-{
-    FILE *file = j->output ? fopen(j->output, "wb") : stdout;
-    int is_right;
-
-    if (!file)
-        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
-    is_right = fwrite(text, 1, length, file) == length;
-    if (!j->output) {
-        report_flush(); /* notes whether standard output took it */
-        return CODE_DONE;
-    }
-    if (fclose(file) != 0 || !is_right)
-        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
-    return CODE_DONE;
-}
-
 /* Makes the text in memory first, so that a file that is refused leaves nothing. */
 static int make(job *j, header *h)
 {
@@ -489,7 +471,7 @@ static int make(job *j, header *h)
     if (fclose(h->out) != 0 && code == CODE_DONE)
         code = report(CODE_SYSTEM, "%s", strerror(errno));
     if (code == CODE_DONE)
-        code = keep(j, text, length);
+        code = report_write_file(j->output, text, length);
     free(text);
     return code;
 }

@@ -350,21 +350,6 @@ static int try_text(const char *text, size_t length, char wrong[YAML_FILE_WRONG_
     return code == CODE_DONE;
 }
 
-static int keep(const import *j, const char *text, size_t length)
-{
-    FILE *file = j->output ? fopen(j->output, "wb") : stdout;
-    int is_right;
-
-    if (!file)
-        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
-    is_right = fwrite(text, 1, length, file) == length;
-    if (!j->output)
-        report_flush();
-    else if (fclose(file) != 0 || !is_right)
-        return report(CODE_SYSTEM, "%s: %s", j->output, strerror(errno));
-    return CODE_DONE;
-}
-
 int import_write(import *j)
 {
     char wrong[YAML_FILE_WRONG_BYTES], *text;
@@ -389,7 +374,7 @@ int import_write(import *j)
             code =
                 report(CODE_WRONG, "%s: what was made of it is no device file: %s", j->path, wrong);
         if (is_right)
-            code = keep(j, text, length);
+            code = report_write_file(j->output, text, length);
         free(text);
     }
     free(d.places);

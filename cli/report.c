@@ -212,6 +212,21 @@ int report_failure(const char *who, uint8_t status, uint8_t exception, uint32_t 
                   advice);
 }
 
+int report_write_file(const char *path, const char *text, size_t length)
+{
+    FILE *file = path ? fopen(path, "wb") : stdout;
+    int is_right;
+
+    if (!file)
+        return report(CODE_SYSTEM, "%s: %s", path, strerror(errno));
+    is_right = fwrite(text, 1, length, file) == length;
+    if (!path)
+        report_flush();
+    else if (fclose(file) != 0 || !is_right)
+        return report(CODE_SYSTEM, "%s: %s", path, strerror(errno));
+    return CODE_DONE;
+}
+
 void report_print_json(cJSON *object)
 {
     char *text = cJSON_PrintUnformatted(object);

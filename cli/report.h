@@ -5,6 +5,7 @@
 #define REPORT_H
 
 #include <signal.h>
+#include <stddef.h>
 #include <stdint.h>
 
 enum {
@@ -76,6 +77,10 @@ const char *report_words(uint8_t status, uint8_t exception);
 
 /* An error number in words. EPIPE is the end of a line here, not "Broken pipe" as strerror says. */
 const char *report_error_text(int error);
+
+/* Writes a text to a file, or to stdout if `path` is NULL. Returns CODE_DONE, or another exit code
+ * after reporting the reason; what is wrong with stdout is reported at the end. */
+int report_write_file(const char *path, const char *text, size_t length);
 
 /* Prints an object in one line to stdout, and frees it. report_add_json adds the status of a
  * request to it: its exit code, its status in words, and the code of an exception. report_json does
