@@ -46,6 +46,20 @@ void import_lose(import *j, int line, const char *what, const char *why, ...)
 /* Names each key of a map that nothing has looked up. `of` says of what: "sensor Voltage". */
 void import_lose_rest(import *j, const tree *map, const char *of);
 
+/* Words of theirs and the words of the device file for them; NULL ends them. */
+typedef struct import_words {
+    const char *theirs, *ours;
+} import_words;
+
+/* Returns our word for one of theirs, or NULL. */
+const char *import_word(const import_words *words, const char *theirs);
+
+/* Set the name of the line, as the command line of mbm has it: any, or that of a serial one, with
+ * the frames rtu or ascii. Of the parity and the data bits the first letter and digit count. */
+void import_line(import *j, const char *name, ...) __attribute__((format(printf, 2, 3)));
+void import_serial_line(import *j, const char *frames, const char *path, const char *baud,
+                        const char *parity, const char *stop, const char *data);
+
 /* Begins a field. Its name is `text`, changed so that it obeys the rule of names and no field
  * before has it. Returns its index. */
 unsigned import_field(import *j, int line, const char *text);

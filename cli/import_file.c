@@ -76,6 +76,34 @@ const char *import_quote(const char *text)
     return quoted;
 }
 
+/* --- words and lines --- */
+
+const char *import_word(const import_words *words, const char *theirs)
+{
+    while (words->theirs && strcmp(words->theirs, theirs) != 0)
+        words++;
+    return words->ours;
+}
+
+void import_line(import *j, const char *name, ...)
+{
+    va_list values;
+
+    va_start(values, name);
+    if (vasprintf(&j->line, name, values) < 0)
+        j->line = NULL;
+    va_end(values);
+}
+
+void import_serial_line(import *j, const char *frames, const char *path, const char *baud,
+                        const char *parity, const char *stop, const char *data)
+{
+    const char *word = *parity == 'E' ? "even" : *parity == 'O' ? "odd" : "none";
+
+    import_line(j, "%s:%s?baud=%s&parity=%s&stop=%s%s", frames, path, baud, word, stop,
+                strcmp(frames, "ascii") == 0 && *data == '7' ? "&data=7" : "");
+}
+
 /* --- parts --- */
 
 static import_part *part_of(import *j, unsigned field)

@@ -10,33 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A word of theirs and the word of the device file. */
-typedef struct pair_of_words {
-    const char *theirs, *ours;
-} pair_of_words;
-
-/* Returns our word, or NULL. */
-static const char *word_of(const pair_of_words *words, const char *theirs)
-{
-    while (words->theirs && strcmp(words->theirs, theirs) != 0)
-        words++;
-    return words->ours;
-}
-
-static const pair_of_words TABLES[] = {
+static const import_words TABLES[] = {
     {"holding", "holding"}, {"holdings", "holding"},        {"input", "input"}, {"coil", "coils"},
     {"coils", "coils"},     {"discrete_input", "discrete"}, {NULL, NULL}};
-static const pair_of_words TYPES[] = {
+static const import_words TYPES[] = {
     {"int16", "int16"},     {"int32", "int32"},   {"int64", "int64"},   {"uint16", "uint16"},
     {"uint32", "uint32"},   {"uint64", "uint64"}, {"float32", "float"}, {"float64", "double"},
     {"float16", "float16"}, {"string", "text"},   {"custom", "custom"}, {NULL, NULL}};
-static const pair_of_words ORDERS[] = {
+static const import_words ORDERS[] = {
     {"byte", "BADC"}, {"word", "CDAB"}, {"word_byte", "DCBA"}, {"none", ""}, {NULL, NULL}};
 /* One letter of Python's struct, of big-endian values. */
-static const pair_of_words STRUCTURES[] = {{">h", "int16"},  {">H", "uint16"},  {">i", "int32"},
-                                           {">I", "uint32"}, {">l", "int32"},   {">L", "uint32"},
-                                           {">q", "int64"},  {">Q", "uint64"},  {">f", "float"},
-                                           {">d", "double"}, {">e", "float16"}, {NULL, NULL}};
+static const import_words STRUCTURES[] = {{">h", "int16"},  {">H", "uint16"},  {">i", "int32"},
+                                          {">I", "uint32"}, {">l", "int32"},   {">L", "uint32"},
+                                          {">q", "int64"},  {">Q", "uint64"},  {">f", "float"},
+                                          {">d", "double"}, {">e", "float16"}, {NULL, NULL}};
 
 /* How many registers a value of a type has; 0 of a text. */
 static unsigned registers_of(const char *type)
@@ -116,10 +103,10 @@ static const char *type_of(import *j, tree *entity, const char *name)
 {
     const char *theirs = tree_text(entity, "data_type", "int16");
     const char *structure = tree_text(entity, "structure", NULL);
-    const char *type = word_of(TYPES, theirs);
+    const char *type = import_word(TYPES, theirs);
 
     if (type && strcmp(type, "custom") == 0)
-        type = structure ? word_of(STRUCTURES, structure) : NULL;
+        type = structure ? import_word(STRUCTURES, structure) : NULL;
     if (!type)
         import_lose(j, line_of(entity, structure ? "structure" : "data_type"), name,
                     "the data_type %s%s%s has no counterpart: the field is left out", theirs,
@@ -131,7 +118,7 @@ static const char *type_of(import *j, tree *entity, const char *name)
 static int set_value(import *j, unsigned field, tree *entity, const char *scale, const char *offset)
 {
     const char *name = import_name(j, field), *type = type_of(j, entity, name);
-    const char *swap = tree_text(entity, "swap", "none"), *order = word_of(ORDERS, swap);
+    const char *swap = tree_text(entity, "swap", "none"), *order = import_word(ORDERS, swap);
     const char *count = tree_text(entity, "count", NULL);
     const int line = line_of(entity, "count");
 
@@ -183,7 +170,7 @@ static unsigned every_of(import *j, unsigned field)
 static void import_sensor(import *j, tree *entity)
 {
     const unsigned field = begin(j, entity, "");
-    const char *table = word_of(TABLES, tree_text(entity, "input_type", "holding"));
+    const char *table = import_word(TABLES, tree_text(entity, "input_type", "holding"));
     const char *nan = tree_text(entity, "nan_value", NULL);
 
     set_place(j, field, entity->line, table ? table : "holding", tree_text(entity, "address", ""));
@@ -203,7 +190,7 @@ static void import_sensor(import *j, tree *entity)
 static void import_binary_sensor(import *j, tree *entity)
 {
     const unsigned field = begin(j, entity, "");
-    const char *table = word_of(TABLES, tree_text(entity, "input_type", "coil"));
+    const char *table = import_word(TABLES, tree_text(entity, "input_type", "coil"));
     const int is_register = table && (table[0] == 'h' || table[0] == 'i');
 
     set_place(j, field, entity->line, table ? table : "coils", tree_text(entity, "address", ""));
@@ -231,7 +218,7 @@ static void import_state(import *j, tree *entity, tree *verify, const char *tabl
                          const char *address, const char *off, const char *on)
 {
     const char *theirs = tree_text(verify, "input_type", NULL);
-    const char *other_table = theirs ? word_of(TABLES, theirs) : table;
+    const char *other_table = theirs ? import_word(TABLES, theirs) : table;
     const char *other = tree_text(verify, "address", address);
     unsigned field;
 
@@ -250,7 +237,8 @@ static void import_switch(import *j, tree *entity)
 {
     const unsigned field = begin(j, entity, "");
     const char *write_type = tree_text(entity, "write_type", "holding");
-    const char *table = word_of(TABLES, write_type), *address = tree_text(entity, "address", "");
+    const char *table = import_word(TABLES, write_type),
+               *address = tree_text(entity, "address", "");
     const char *off = tree_text(entity, "command_off", "0"),
                *on = tree_text(entity, "command_on", "1");
     tree *verify = tree_find(entity, "verify");
@@ -277,7 +265,7 @@ static void import_switch(import *j, tree *entity)
 static void import_cover(import *j, tree *entity)
 {
     const unsigned field = begin(j, entity, "");
-    const char *table = word_of(TABLES, tree_text(entity, "input_type", "holding"));
+    const char *table = import_word(TABLES, tree_text(entity, "input_type", "holding"));
 
     table = table ? table : "holding";
     set_place(j, field, entity->line, table, tree_text(entity, "address", ""));
@@ -401,7 +389,7 @@ static void import_climate(import *j, tree *entity)
         tree_peek(entity, "current_temp_offset") ? "current_temp_offset" : "offset";
     const char *degrees =
         strcasecmp(tree_text(entity, "temperature_unit", "C"), "F") == 0 ? "\u00B0F" : "\u00B0C";
-    const char *table = word_of(TABLES, tree_text(entity, "input_type", "holding"));
+    const char *table = import_word(TABLES, tree_text(entity, "input_type", "holding"));
     const unsigned field = begin(j, entity, " temperature");
 
     set_place(j, field, entity->line, table ? table : "holding", tree_text(entity, "address", ""));
@@ -427,7 +415,7 @@ static void import_each(import *j, tree *hub, const char *key, void (*import_one
 {
     tree *list = tree_find(hub, key), *at;
 
-    for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
+    for (at = tree_items(list); at; at = at->next)
         if (at->kind == TREE_MAP)
             import_one(j, at);
         else
@@ -443,22 +431,15 @@ static void make_line(import *j, tree *hub)
     const char *host = tree_text(hub, "host", ""), *method = tree_text(hub, "method", "rtu");
     const char *parity = tree_text(hub, "parity", "N"), *size = tree_text(hub, "bytesize", "8");
     const char *baud = tree_text(hub, "baudrate", "19200"), *stop = tree_text(hub, "stopbits", "1");
-    int failed;
 
     if (strcmp(type, "serial") == 0)
-        failed = asprintf(&j->line, "%s:%s?baud=%s&parity=%s&stop=%s%s", method, port, baud,
-                          *parity == 'E'   ? "even"
-                          : *parity == 'O' ? "odd"
-                                           : "none",
-                          stop, strcmp(method, "ascii") == 0 && *size == '7' ? "&data=7" : "") < 0;
+        import_serial_line(j, method, port, baud, parity, stop, size);
     else
-        failed = asprintf(&j->line, "%s://%s:%s",
-                          strcmp(type, "udp") == 0          ? "udp"
-                          : strcmp(type, "rtuovertcp") == 0 ? "rtu+tcp"
-                                                            : "tcp",
-                          host, port) < 0;
-    if (failed)
-        j->line = NULL;
+        import_line(j, "%s://%s:%s",
+                    strcmp(type, "udp") == 0          ? "udp"
+                    : strcmp(type, "rtuovertcp") == 0 ? "rtu+tcp"
+                                                      : "tcp",
+                    host, port);
 }
 
 static void import_hub(import *j, tree *hub)
@@ -496,12 +477,8 @@ static void import_hub(import *j, tree *hub)
 /* Returns whether a hub is the one that --hub names. */
 static int is_chosen(const import *j, const tree *hub)
 {
-    const tree *name = tree_peek(hub, "name"), *host = tree_peek(hub, "host"),
-               *port = tree_peek(hub, "port");
-
-    return !j->hub || (name && name->text && strcmp(name->text, j->hub) == 0) ||
-           (host && host->text && strcmp(host->text, j->hub) == 0) ||
-           (port && port->text && strcmp(port->text, j->hub) == 0);
+    return !j->hub || tree_has(hub, "name", j->hub) || tree_has(hub, "host", j->hub) ||
+           tree_has(hub, "port", j->hub);
 }
 
 /* Finds the hub: the one of the file, or the one that --hub names. NULL after a report. */
@@ -515,7 +492,7 @@ static tree *choose_hub(const import *j, tree *root)
         chosen = found;
         count = 1;
     }
-    for (at = found->kind == TREE_LIST ? found->first : NULL; at; at = at->next)
+    for (at = tree_items(found); at; at = at->next)
         if (at->kind == TREE_MAP && is_chosen(j, at)) {
             chosen = at;
             count++;

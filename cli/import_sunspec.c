@@ -42,21 +42,18 @@ static const point_type *find_type(const char *theirs)
 }
 
 /* Units that SunSpec writes otherwise than Home Assistant. */
-static const char *const UNITS[][2] = {
+static const import_words UNITS[] = {
     {"C", "\u00B0C"},      {"Pct", "%"},     {"Secs", "s"},         {"Mins", "min"},
     {"VAr", "var"},        {"VArh", "varh"}, {"Degrees", "\u00B0"}, {"deg", "\u00B0"},
     {"W/m2", "W/m\u00B2"}, {"hours", "h"},   {"HPa", "hPa"},        {"mps", "m/s"},
-    {"Mm", "mm"},
+    {"Mm", "mm"},          {NULL, NULL},
 };
 
 static const char *unit_of(const char *theirs)
 {
-    size_t i;
+    const char *ours = import_word(UNITS, theirs);
 
-    for (i = 0; i < sizeof UNITS / sizeof UNITS[0]; i++)
-        if (strcmp(UNITS[i][0], theirs) == 0)
-            return UNITS[i][1];
-    return theirs;
+    return ours ? ours : theirs;
 }
 
 /* Where an import is: the address of the next point, and what stands before its name. */
@@ -99,7 +96,7 @@ static void add_bits(position *p, tree *point, const char *name, uint32_t addres
     const unsigned long size = strtoul(tree_text(point, "size", "1"), NULL, 10);
     tree *at;
 
-    for (at = symbols && symbols->kind == TREE_LIST ? symbols->first : NULL; at; at = at->next) {
+    for (at = tree_items(symbols); at; at = at->next) {
         const unsigned long bit = strtoul(tree_text(at, "value", "0"), NULL, 10);
         const unsigned field =
             import_field(p->j, at->line, say("%s %s", name, tree_text(at, "name", "?")));
@@ -235,7 +232,7 @@ static void import_groups(position *p, tree *groups, const char *before)
     tree *at;
     uint32_t i;
 
-    for (at = groups && groups->kind == TREE_LIST ? groups->first : NULL; at; at = at->next) {
+    for (at = tree_items(groups); at; at = at->next) {
         const char *name = tree_text(at, "name", "group");
         const uint32_t count = count_of(p, at, name);
 
@@ -257,7 +254,7 @@ static void import_group(position *p, tree *group, const char *before)
         return;
     }
     p->depth++;
-    for (at = points && points->kind == TREE_LIST ? points->first : NULL; at; at = at->next)
+    for (at = tree_items(points); at; at = at->next)
         if (at->kind == TREE_MAP)
             import_point(p, at, before);
     import_groups(p, tree_find(group, "groups"), before);
@@ -269,7 +266,6 @@ int import_sunspec(import *j)
     char wrong[YAML_FILE_WRONG_BYTES];
     int code;
     tree *root = tree_read_yaml(j->path, &code, wrong), *group = tree_peek(root, "group");
-    const tree *id = tree_peek(root, "id");
     position p = {.j = j, .address = j->address};
 
     if (!root)
@@ -278,7 +274,7 @@ int import_sunspec(import *j)
         code =
             report(CODE_WRONG,
                    "%s: this is no model of SunSpec: it has no \"group\" with \"points\"", j->path);
-    else if (!j->has_address && !(id && id->text && strcmp(id->text, "1") == 0))
+    else if (!j->has_address && !tree_has(root, "id", "1"))
         code = report(CODE_WRONG,
                       "%s: give the address of the model's ID with --address: mbm scan --sunspec "
                       "finds it",

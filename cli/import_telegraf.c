@@ -25,21 +25,11 @@ static const type_of_theirs TYPES[] = {
     {"BIT", "bit", 1},
 };
 
-static const char *const ORDERS[][2] = {
+static const import_words ORDERS[] = {
     {"AB", "ABCD"},   {"ABCD", "ABCD"},     {"ABCDEFGH", "ABCD"}, {"BA", "BADC"},
     {"BADC", "BADC"}, {"BADCFEHG", "BADC"}, {"CDAB", "CDAB"},     {"GHEFCDAB", "CDAB"},
-    {"DCBA", "DCBA"}, {"HGFEDCBA", "DCBA"},
+    {"DCBA", "DCBA"}, {"HGFEDCBA", "DCBA"}, {NULL, NULL},
 };
-
-static const char *order_of(const char *theirs)
-{
-    size_t i;
-
-    for (i = 0; i < sizeof ORDERS / sizeof ORDERS[0]; i++)
-        if (strcmp(ORDERS[i][0], theirs) == 0)
-            return ORDERS[i][1];
-    return NULL;
-}
 
 /* Finds a type. FLOAT32 is a number with a fixed point in the style register, and a float in the
  * others; FIXED and UFIXED are such numbers, too. */
@@ -92,8 +82,9 @@ static unsigned begin(import *j, tree *from, const context *of)
 
 /* Sets type, count and order. Returns 0 if there is no such type here. */
 static int set_type(import *j, unsigned field, tree *from, const char *theirs, unsigned addresses,
-                    const char *order, const char *location)
+                    const char *byte_order, const char *location)
 {
+    const char *order = byte_order ? import_word(ORDERS, byte_order) : "ABCD";
     const int is_lower = strcmp(location, "lower") == 0, is_upper = strcmp(location, "upper") == 0;
     const type_of_theirs *type = find_type(theirs, addresses);
     const int is_byte = strcmp(theirs, "UINT8L") == 0 || strcmp(theirs, "UINT8H") == 0;
@@ -126,11 +117,11 @@ static int set_type(import *j, unsigned field, tree *from, const char *theirs, u
     if (addresses > 0 && type->registers > 0 && addresses != type->registers)
         import_lose(j, from->line, import_name(j, field), "%s has %u registers and not %u", theirs,
                     type->registers, addresses);
-    if (order && !order_of(order))
+    if (!order)
         import_lose(j, from->line, import_name(j, field), "the byte_order %s has no counterpart",
-                    order);
-    else if (order && strcmp(order_of(order), "ABCD") != 0)
-        import_set(j, field, from->line, "order", "%s", order_of(order));
+                    byte_order);
+    else if (strcmp(order, "ABCD") != 0)
+        import_set(j, field, from->line, "order", "%s", order);
     return 1;
 }
 
@@ -153,7 +144,7 @@ static unsigned read_addresses(import *j, tree *from, const char *name, const ch
     unsigned count = 0;
     unsigned long last = 0;
 
-    for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next) {
+    for (at = tree_items(list); at; at = at->next) {
         const unsigned long address = at->text ? strtoul(at->text, NULL, 10) : 0;
 
         if (count > 0 && address != last + 1) {
@@ -197,7 +188,7 @@ static void import_registers(import *j, tree *plugin, const char *key, const cha
         .table = table, .location = location, .is_bits = table[0] == 'c' || table[0] == 'd'};
     tree *list = tree_find(plugin, key), *at;
 
-    for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
+    for (at = tree_items(list); at; at = at->next)
         if (at->kind == TREE_MAP)
             import_register(j, at, &of);
 }
@@ -251,7 +242,7 @@ static void import_request(import *j, tree *request, const char *location)
                   .location = location};
     tree *fields = tree_find(request, "fields"), *at;
 
-    for (at = fields && fields->kind == TREE_LIST ? fields->first : NULL; at; at = at->next)
+    for (at = tree_items(fields); at; at = at->next)
         if (at->kind == TREE_MAP)
             import_requested(j, at, &of);
     import_lose_rest(j, request, "a request");
@@ -261,7 +252,7 @@ static void import_requests(import *j, tree *plugin, const char *key, const char
 {
     tree *list = tree_find(plugin, key), *at;
 
-    for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
+    for (at = tree_items(list); at; at = at->next)
         if (at->kind == TREE_MAP)
             import_request(j, at, location);
 }
@@ -271,31 +262,22 @@ static void import_requests(import *j, tree *plugin, const char *key, const char
 /* The name of the line, of tcp://host:port or file:///dev/ttyUSB0. */
 static void make_line(import *j, tree *plugin)
 {
-    const char *controller = tree_text(plugin, "controller", ""), *parity;
+    const char *controller = tree_text(plugin, "controller", "");
     const char *mode = tree_text(plugin, "transmission_mode", "auto");
     const char *baud = tree_text(plugin, "baud_rate", "9600");
     const char *stop = tree_text(plugin, "stop_bits", "1");
     const char *data = tree_text(plugin, "data_bits", "8");
+    const char *parity = tree_text(plugin, "parity", "N");
     const char *path = strncmp(controller, "file://", 7) == 0 ? controller + 7 : NULL;
     const char *host = strncmp(controller, "tcp://", 6) == 0 ? controller + 6 : NULL;
-    const int is_ascii = strcasecmp(mode, "ASCII") == 0;
-    int failed = 0;
 
-    parity = tree_text(plugin, "parity", "N");
     if (path)
-        failed = asprintf(&j->line, "%s:%s?baud=%s&parity=%s&stop=%s%s", is_ascii ? "ascii" : "rtu",
-                          path, baud,
-                          *parity == 'E'   ? "even"
-                          : *parity == 'O' ? "odd"
-                                           : "none",
-                          stop, is_ascii && *data == '7' ? "&data=7" : "") < 0;
+        import_serial_line(j, strcasecmp(mode, "ASCII") == 0 ? "ascii" : "rtu", path, baud, parity,
+                           stop, data);
     else if (host)
-        failed = asprintf(&j->line, "%s://%s",
-                          strcasecmp(mode, "RTUoverTCP") == 0 ? "rtu+tcp" : "tcp", host) < 0;
+        import_line(j, "%s://%s", strcasecmp(mode, "RTUoverTCP") == 0 ? "rtu+tcp" : "tcp", host);
     else if (*controller)
         import_lose(j, plugin->line, "controller", "%s has no counterpart", controller);
-    if (failed)
-        j->line = NULL;
 }
 
 /* Moves a time or a number to the head, if it is not 0. */
@@ -355,10 +337,7 @@ static void import_plugin(import *j, tree *plugin, tree *agent)
 
 static int is_chosen(const import *j, const tree *plugin)
 {
-    const tree *name = tree_peek(plugin, "name"), *controller = tree_peek(plugin, "controller");
-
-    return !j->hub || (name && name->text && strcmp(name->text, j->hub) == 0) ||
-           (controller && controller->text && strcmp(controller->text, j->hub) == 0);
+    return !j->hub || tree_has(plugin, "name", j->hub) || tree_has(plugin, "controller", j->hub);
 }
 
 int import_telegraf(import *j)
@@ -371,7 +350,7 @@ int import_telegraf(import *j)
 
     if (!root)
         return report(code, "%s", wrong);
-    for (at = list && list->kind == TREE_LIST ? list->first : NULL; at; at = at->next)
+    for (at = tree_items(list); at; at = at->next)
         if (at->kind == TREE_MAP && is_chosen(j, at)) {
             chosen = at;
             count++;

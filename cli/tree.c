@@ -66,6 +66,18 @@ tree *tree_find(tree *map, const char *key)
     return found;
 }
 
+tree *tree_items(const tree *list)
+{
+    return list && list->kind == TREE_LIST ? list->first : NULL;
+}
+
+int tree_has(const tree *map, const char *key, const char *word)
+{
+    const tree *found = tree_peek(map, key);
+
+    return found && found->kind == TREE_WORD && strcmp(found->text, word) == 0;
+}
+
 const char *tree_text(tree *map, const char *key, const char *otherwise)
 {
     const tree *found = tree_find(map, key);

@@ -32,6 +32,12 @@ tree *tree_add(tree *parent, int kind, int line, const char *key, const char *te
 tree *tree_find(tree *map, const char *key);
 tree *tree_peek(const tree *map, const char *key);
 
+/* The first item of a list, from which `next` leads to the others; NULL if it is no list. */
+tree *tree_items(const tree *list);
+
+/* Whether a key of a map is this word. It is not marked. */
+int tree_has(const tree *map, const char *key, const char *word);
+
 /* The text of a key that is a word, or `otherwise`. */
 const char *tree_text(tree *map, const char *key, const char *otherwise);
 
