@@ -19,6 +19,7 @@ enum { IMPORT_KEYS = 32 };
 
 /* The head of the file, or a field. */
 typedef struct import_part {
+    char *name, *topic, *identifier; /* of a field; see names.h */
     import_pair pairs[IMPORT_KEYS];
     unsigned count;
     int line; /* of the foreign file */
@@ -64,7 +65,7 @@ void import_serial_line(import *j, const char *frames, const char *path, const c
  * before has it. Returns its index. */
 unsigned import_field(import *j, int line, const char *text);
 
-/* The name of a field as it is in the file. */
+/* The name of a field, without quotes. */
 const char *import_name(const import *j, unsigned field);
 
 /* Sets a key of a field, or of the head (IMPORT_HEAD): a value as YAML writes it, or any text,

@@ -144,45 +144,51 @@ void import_set_text(import *j, unsigned field, int line, const char *key, const
         add_pair(j, part_of(j, field), line, key, strdup(import_quote(text)));
 }
 
+static void free_names(import_part *part)
+{
+    free(part->name);
+    free(part->topic);
+    free(part->identifier);
+}
+
 static void free_part(import_part *part)
 {
     while (part->count > 0) {
         free(part->pairs[--part->count].key);
         free(part->pairs[part->count].value);
     }
+    free_names(part);
 }
 
 /* --- names --- */
 
-/* Whether two names become the same topic or the same identifier. */
-static int is_same_name(const char *one, const char *other)
-{
-    char *a = names_identifier(one), *b = names_identifier(other);
-    char *c = names_topic(one), *d = names_topic(other);
-    const int is_same = a && b && c && d && (strcmp(a, b) == 0 || strcmp(c, d) == 0);
-
-    free(a);
-    free(b);
-    free(c);
-    free(d);
-    return is_same;
-}
-
-/* The name as it was given, before it is quoted: it is the first pair of a field, kept beside it.
- */
 const char *import_name(const import *j, unsigned field)
 {
-    return j->is_out_of_memory ? "" : j->fields[field].pairs[1].value;
+    return j->is_out_of_memory ? "" : j->fields[field].name;
 }
 
-static int is_taken(const import *j, const char *name)
+/* Whether a field before this one becomes the same topic or the same identifier. */
+static int is_taken(const import *j, const import_part *part)
 {
-    unsigned i;
+    const import_part *other;
 
-    for (i = 0; i < j->field_count; i++)
-        if (is_same_name(import_name(j, i), name))
+    for (other = j->fields; other < part; other++)
+        if (strcmp(other->topic, part->topic) == 0 ||
+            strcmp(other->identifier, part->identifier) == 0)
             return 1;
     return 0;
+}
+
+/* Gives the last field a name. Returns 0 if a field before it has the same. */
+static int set_name(import *j, import_part *part, const char *name)
+{
+    free_names(part);
+    part->name = strdup(name);
+    part->topic = names_topic(name);
+    part->identifier = names_identifier(name);
+    if (!part->name || !part->topic || !part->identifier)
+        j->is_out_of_memory = 1;
+    return j->is_out_of_memory || !is_taken(j, part);
 }
 
 /* Makes a text that may be a name: without control characters, of at most 8 levels, short, and with
@@ -210,6 +216,7 @@ unsigned import_field(import *j, int line, const char *text)
 {
     char name[DEVICE_NAME_BYTES], other[DEVICE_NAME_BYTES + 12];
     unsigned number = 1;
+    import_part *part;
 
     if (j->field_count == j->capacity) {
         const unsigned capacity = j->capacity ? 2 * j->capacity : 64;
@@ -222,18 +229,18 @@ unsigned import_field(import *j, int line, const char *text)
         j->fields = more;
         j->capacity = capacity;
     }
+    part = &j->fields[j->field_count];
+    memset(part, 0, sizeof *part);
+    part->line = line;
     clean_name(j, text, name);
     snprintf(other, sizeof other, "%s", name);
-    while (is_taken(j, other))
+    while (!set_name(j, part, other))
         snprintf(other, sizeof other, "%s %u", name, ++number);
     if (strcmp(other, text) != 0)
         import_lose(j, line, text, "the name is \"%s\" here%s", other,
                     number > 1 ? ": another field has it" : "");
-    memset(&j->fields[j->field_count], 0, sizeof j->fields[0]);
-    j->fields[j->field_count].line = line;
     j->field_count++;
     import_set_text(j, j->field_count - 1, line, "name", other);
-    import_set(j, j->field_count - 1, line, "", "%s", other);
     return j->field_count - 1;
 }
 
@@ -290,8 +297,6 @@ static void write_draft(const import *j, draft *d)
         for (k = 0; k < j->fields[i].count; k++) {
             const import_pair *pair = &j->fields[i].pairs[k];
 
-            if (!*pair->key)
-                continue;
             fprintf(d->out, "%s%s: %s\n", k == 0 ? "  - " : "    ", pair->key, pair->value);
             add_line(d, i, k);
         }
@@ -300,9 +305,9 @@ static void write_draft(const import *j, draft *d)
 /* Keys without which a field would have a wrong value, or another one. */
 static int is_needed(const char *key)
 {
-    static const char *const NEEDED[] = {"name",   "table",         "address", "type",  "count",
-                                         "bit",    "scale",         "offset",  "order", "unit",
-                                         "repeat", "not_available", ""};
+    static const char *const NEEDED[] = {"name",  "table", "address", "type",
+                                         "count", "bit",   "scale",   "offset",
+                                         "order", "unit",  "repeat",  "not_available"};
     size_t i;
 
     for (i = 0; i < sizeof NEEDED / sizeof NEEDED[0]; i++)
