@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device_home.h"
 
+#include "device_initial.h"
 #include "home.h"
 
 #include <stdio.h>
@@ -151,32 +152,6 @@ static int read_state(yaml_file *file, const yaml_node_t *node, const mbm_planFi
 
 /* --- press --- */
 
-static const char *const BITS[] = {"0", "1", "false", "true", "off", "on", NULL};
-
-/* Refuses a value that the field cannot have. Returns 0 then. */
-static int check_press(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
-                       const device_field *field)
-{
-    uint16_t words[VALUE_WORDS];
-    uint32_t bits;
-    int index;
-    const char *wrong;
-
-    if (value_is_text(planned->type)) {
-        if (strlen(field->press) > planned->count)
-            return yaml_file_refuse(file, node, "press has %zu characters, and count is %u",
-                                    strlen(field->press), planned->count);
-        return 1;
-    }
-    if (home_is_bit(planned))
-        return yaml_file_word(file, "press", node, BITS, &index);
-    if (device_is_part(planned))
-        return yaml_file_number(file, "press", node, 0, (1u << planned->count) - 1, &bits);
-    if (value_read(&field->form, field->press, strlen(field->press), words, &wrong) == 0)
-        return yaml_file_refuse(file, node, "press: \"%s\" %s", field->press, wrong);
-    return 1;
-}
-
 static int read_press(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
                       device_field *field)
 {
@@ -188,7 +163,7 @@ static int read_press(yaml_file *file, const yaml_node_t *node, const mbm_planFi
         return yaml_file_refuse(file, node, "press is for fields of one value: count is %u",
                                 planned->count);
     return yaml_file_copy(file, "press", node, VALUE_LONGEST, &field->press) &&
-           check_press(file, node, planned, field);
+           device_initial_check(file, "press", node, planned, field);
 }
 
 int device_home_read(yaml_file *file, const yaml_node_t *device_class,

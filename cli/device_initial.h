@@ -12,4 +12,9 @@
 int device_initial_read(yaml_file *file, const yaml_node_t *node, const mbm_planField *planned,
                         device_field *field);
 
+/* Whether a node is a value of a field, which has one, and whose form is known. Returns 0 after a
+ * refusal, which names the key. */
+int device_initial_check(yaml_file *file, const char *key, const yaml_node_t *node,
+                         const mbm_planField *planned, const device_field *field);
+
 #endif

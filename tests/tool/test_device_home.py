@@ -36,6 +36,7 @@ fields:
 - {name: acknowledge, table: coils, address: 1, access: write, press: on}
 - {name: command, table: holding, address: 21, type: text, count: 8, access: write, press: '"go"'}
 - {name: mode, table: holding, address: 30, type: uint16, access: write, press: 2, enumeration: {1: slow, 2: fast}}
+- {name: frost, table: holding, address: 31, type: uint16, offset: -40, access: write, press: -10}
 """
 
 
@@ -68,12 +69,12 @@ def test_classes_are_those_of_the_file_or_go_with_the_unit(home):
         "setpoint": ("number", "temperature", None), "factor": ("sensor", "power_factor", "measurement"),
         "starts": ("sensor", None, "total_increasing"), "raw": ("sensor", None, None), "state": ("sensor", "enum", None),
         "runs": ("binary_sensor", "running", None), "socket": ("switch", "outlet", None), "reset": ("button", "restart", None),
-        "acknowledge": ("button", None, None), "command": ("button", None, None), "mode": ("button", None, None)}
+        "acknowledge": ("button", None, None), "command": ("button", None, None), "mode": ("button", None, None), "frost": ("button", None, None)}
 
 
 def test_a_button_writes_what_the_file_says(home, plain):
     for name, words, printed in (("reset", "20", "31750"), ("acknowledge", "--table coils 1", "1"), ("command", "--type text 21 8", '"go"'),
-                                 ("mode", "30", "2")):
+                                 ("mode", "30", "2"), ("frost", "31", "30")):
         config = home.found[name][1]
         assert not {"state_topic", "options", "unit_of_measurement"} & set(config)
         home.subscriber.expect_result(config["command_topic"].removesuffix("/set"), config["payload_press"], "success")
@@ -122,6 +123,8 @@ NUMBER = "table: input, address: 0, type: uint16"
     ("table: coils, address: 0, access: write, press: 2", 'press: "2" is not one of 0, 1, false, true, off and on'),
     ("table: coils, address: 0, count: 2, access: write, press: 1", "press is for fields of one value: count is 2"),
     ("table: holding, address: 0, type: text, count: 2, access: write, press: abc", "press has 3 characters, and count is 2"),
+    ("table: holding, address: 0, type: text, count: 4, access: write, press: \u2603", "press has a character that is not in Latin-1"),
+    ("table: holding, address: 0, type: uint16, offset: -40, access: write, press: -50", 'press: "-50" is out of range of uint16'),
 ])
 @pytest.mark.parametrize("command", ["poll tcp://127.0.0.1:1", "serve tcp://127.0.0.1:0", "bridge -b 127.0.0.1:1 tcp://127.0.0.1:1", "header"])
 def test_a_class_that_home_assistant_refuses_is_refused_with_its_line(plain, write, command, field, sentence):
