@@ -36,12 +36,7 @@ int device_address_read_notation(yaml_file *file, const yaml_node_t *notation,
 
 int device_address_read_table(yaml_file *file, const yaml_node_t *node, uint8_t *table)
 {
-    int index = *table - 1;
-
-    if (!yaml_file_word(file, "table", node, value_table_names + 1, &index))
-        return 0;
-    *table = (uint8_t)(index + 1);
-    return 1;
+    return yaml_file_kind(file, "table", node, value_table_names + 1, table);
 }
 
 /* Reads a number from 1 to 65536 that is the rest of an address. Returns 0 if it is none. */

@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_REGISTERS = 125, MOST_BITS = 2000, MOST_DESCRIPTION = 10000 };
+enum { MOST_DESCRIPTION = 10000 };
 
 /* The keys of the file and of a field. The numbers count from 0 here. */
 enum {
@@ -97,19 +97,6 @@ static const char *const FIELD_NAMES[] = {"name",          "table",
 static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
 static const char *const ANSWERS[] = {"no", "yes", NULL};
 
-/* Reads a word as its number, from 1 on. Without a node the number stays. Returns 0 after a
- * refusal. */
-static int read_word(yaml_file *file, const char *key, const yaml_node_t *node,
-                     const char *const *names, uint8_t *number)
-{
-    int index = *number - 1;
-
-    if (!yaml_file_word(file, key, node, names + 1, &index))
-        return 0;
-    *number = (uint8_t)(index + 1);
-    return 1;
-}
-
 /* --- a field --- */
 
 /* Reads table and address; `offset` is that of a repetition. Returns 0 after a refusal. */
@@ -156,7 +143,7 @@ static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_
     if (!values[TYPE] && !is_bits)
         return yaml_file_refuse(file, field, "the field has no key type");
     planned->type = MBM_TYPE_BIT;
-    if (!read_word(file, "type", values[TYPE], value_type_names, &planned->type))
+    if (!yaml_file_kind(file, "type", values[TYPE], value_type_names + 1, &planned->type))
         return 0;
     if (is_bits && planned->type != MBM_TYPE_BIT)
         return yaml_file_refuse(file, values[TYPE],
@@ -179,7 +166,7 @@ static int read_size(yaml_file *file, const yaml_node_t *field, const yaml_node_
     if (value_is_text(planned->type) && !values[COUNT])
         return yaml_file_refuse(file, field, "a text needs its number of characters as count");
     if (!yaml_file_number(file, "bit", values[BIT], 0, 15, &bit) ||
-        !yaml_file_number(file, "count", values[COUNT], 1, MOST_BITS, &count))
+        !yaml_file_number(file, "count", values[COUNT], 1, MBM_MAX_READ_BITS, &count))
         return 0;
     planned->count = (uint16_t)count;
     planned->bit = (uint8_t)bit;
@@ -188,11 +175,11 @@ static int read_size(yaml_file *file, const yaml_node_t *field, const yaml_node_
             file, values[COUNT] ? values[COUNT] : field,
             "the field has %u bits from bit %u on: a register has the bits 0 to 15", count, bit);
     size = device_size(planned);
-    if (size > (is_bits ? MOST_BITS : MOST_REGISTERS))
+    if (size > (is_bits ? MBM_MAX_READ_BITS : MBM_MAX_READ_REGISTERS))
         return yaml_file_refuse(
             file, values[COUNT] ? values[COUNT] : field,
             "count is %u: these are %u registers, and one request reads at most %d", count, size,
-            MOST_REGISTERS);
+            MBM_MAX_READ_REGISTERS);
     if (planned->address + size > 65536)
         return yaml_file_refuse(file, values[ADDRESS],
                                 "the field has %u %s from address %s on: addresses end at %s", size,
@@ -211,7 +198,7 @@ static int read_shared(yaml_file *file, const yaml_node_t *unit, const yaml_node
     if (!yaml_file_number(file, "unit", unit, 0, 255, &number) ||
         !yaml_file_time(file, "interval", interval, 1, MBM_PLAN_LONGEST_INTERVAL,
                         &planned->intervalMs) ||
-        !read_word(file, "order", order, value_order_names, &planned->order))
+        !yaml_file_kind(file, "order", order, value_order_names + 1, &planned->order))
         return 0;
     planned->unit = (uint16_t)number;
     return 1;
@@ -224,7 +211,7 @@ static int read_access(yaml_file *file, const yaml_node_t *node, const mbm_planF
         planned->table == MBM_TABLE_DISCRETE_INPUTS || planned->table == MBM_TABLE_INPUT_REGISTERS;
 
     field->access = DEVICE_READ;
-    if (!read_word(file, "access", node, ACCESS_NAMES, &field->access))
+    if (!yaml_file_kind(file, "access", node, ACCESS_NAMES + 1, &field->access))
         return 0;
     if (field->access > DEVICE_READ && is_input)
         return yaml_file_refuse(file, node,

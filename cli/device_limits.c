@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EXCLUDED = 255, MOST_BITS = 2000, MOST_REGISTERS = 125 };
+enum { MOST_EXCLUDED = 255 };
 
 enum { TABLE, ADDRESS, COUNT, UNIT, RANGE_KEYS };
 static const char *const RANGE_NAMES[] = {"table", "address", "count", "unit", NULL};
@@ -36,12 +36,13 @@ static int read_gap(yaml_file *file, const yaml_node_t *node, device_limits *int
         return 1;
     if (node->type == YAML_MAPPING_NODE)
         return yaml_file_keys(file, "gap", node, GAP_NAMES, 0, values) &&
-               read_number(file, "registers", values[REGISTERS], 0, MOST_REGISTERS,
+               read_number(file, "registers", values[REGISTERS], 0, MBM_MAX_READ_REGISTERS,
                            &into->register_gap) &&
-               read_number(file, "bits", values[BITS], 0, MOST_BITS, &into->bit_gap);
-    if (!read_number(file, "gap", node, 0, MOST_BITS, &into->bit_gap))
+               read_number(file, "bits", values[BITS], 0, MBM_MAX_READ_BITS, &into->bit_gap);
+    if (!read_number(file, "gap", node, 0, MBM_MAX_READ_BITS, &into->bit_gap))
         return 0;
-    into->register_gap = into->bit_gap < MOST_REGISTERS ? into->bit_gap : MOST_REGISTERS;
+    into->register_gap =
+        into->bit_gap < MBM_MAX_READ_REGISTERS ? into->bit_gap : MBM_MAX_READ_REGISTERS;
     return 1;
 }
 
@@ -132,9 +133,9 @@ int device_limits_read(yaml_file *file, const yaml_node_t *const *values, device
 {
     device_limits *limits = &into->limits;
 
-    return read_number(file, "max_read_registers", values[LIMITS_READ_REGISTERS], 1, MOST_REGISTERS,
-                       &limits->read_registers) &&
-           read_number(file, "max_read_bits", values[LIMITS_READ_BITS], 1, MOST_BITS,
+    return read_number(file, "max_read_registers", values[LIMITS_READ_REGISTERS], 1,
+                       MBM_MAX_READ_REGISTERS, &limits->read_registers) &&
+           read_number(file, "max_read_bits", values[LIMITS_READ_BITS], 1, MBM_MAX_READ_BITS,
                        &limits->read_bits) &&
            read_number(file, "max_write_registers", values[LIMITS_WRITE_REGISTERS], 1,
                        MBM_MAX_WRITE_REGISTERS, &limits->write_registers) &&
@@ -146,12 +147,7 @@ int device_limits_read(yaml_file *file, const yaml_node_t *const *values, device
 
 int device_limits_read_function(yaml_file *file, const yaml_node_t *node, uint8_t *function)
 {
-    int index = *function - 1;
-
-    if (!yaml_file_word(file, "write_function", node, device_functions, &index))
-        return 0;
-    *function = (uint8_t)(index + 1);
-    return 1;
+    return yaml_file_kind(file, "write_function", node, device_functions, function);
 }
 
 /* --- a field --- */

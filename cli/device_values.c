@@ -266,7 +266,6 @@ int device_values_read(yaml_file *file, const device_values *values, const yaml_
 {
     const int has_own = values->not_available != NULL;
 
-    field->power_field = -1;
     return read_scale(file, values->scale, planned, field) &&
            read_offset(file, values->offset, planned, field) &&
            read_precision(file, values->precision, planned, field) &&

@@ -234,6 +234,17 @@ int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,
     return text && check_value(file, key, node, number_word(text, words, index));
 }
 
+int yaml_file_kind(yaml_file *file, const char *key, const yaml_node_t *node,
+                   const char *const *words, uint8_t *kind)
+{
+    int index = *kind - 1;
+
+    if (!yaml_file_word(file, key, node, words, &index))
+        return 0;
+    *kind = (uint8_t)(index + 1);
+    return 1;
+}
+
 const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node)
 {
     const char *text = yaml_file_text(file, key, node, MOST_WORD);
