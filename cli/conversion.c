@@ -133,18 +133,21 @@ uint8_t conversion_print(const value_form *form, const mbm_registers *registers,
 {
     static decimal_number number;
     const conversion *of = conversion_of(form);
-    const int is_number =
-        !value_is_text(form->type) && !value_is_date(form->type) && form->type != MBM_TYPE_BIT;
-    int is_nan = 0, is_finite = is_number && get_number(form, registers, address, &number, &is_nan);
+    const int is_converted = (of->offset.digits != 0 || of->has_precision) && !form->is_hex &&
+                             !value_is_text(form->type) && !value_is_date(form->type) &&
+                             form->type != MBM_TYPE_BIT;
+    int is_nan = 0, is_finite = 0;
+
+    /* Only a float can be no number. */
+    if (is_converted || value_is_float(form->type))
+        is_finite = get_number(form, registers, address, &number, &is_nan);
 
     if (is_nan || is_listed(form, registers, address, count)) {
         strcpy(text, is_json ? "null" : "");
         return MBM_NOT_AVAILABLE;
     }
-    if (form->is_hex || !is_finite || (of->offset.digits == 0 && !of->has_precision) ||
-        !convert(form, &number)) {
+    if (!is_converted || !is_finite || !convert(form, &number))
         return value_print(form, registers, address, count, is_json, text);
-    }
     if (of->has_precision)
         decimal_round(&number, of->precision);
     decimal_print(&number, of->has_precision ? of->precision : 0, text);
