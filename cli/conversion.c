@@ -206,11 +206,9 @@ static const char *check(const conversion *of, decimal_number *number)
                          : say("is not a multiple of step, which is %s", limit_text(&of->step));
 }
 
-static int has_limits(const value_form *form)
+int conversion_has_limits(const conversion *of)
 {
-    const conversion *of = conversion_of(form);
-
-    return of->has_least || of->has_most || of->has_step;
+    return of && (of->has_least || of->has_most || of->has_step);
 }
 
 const char *conversion_check(const value_form *form, const char *text, size_t length)
@@ -218,7 +216,7 @@ const char *conversion_check(const value_form *form, const char *text, size_t le
     static decimal_number number;
 
     /* What is no number is refused by conversion_read. */
-    if (!has_limits(form) || !decimal_read(text, length, &number))
+    if (!conversion_has_limits(form->conversion) || !decimal_read(text, length, &number))
         return NULL;
     return check(form->conversion, &number);
 }
@@ -229,7 +227,7 @@ const char *conversion_check_registers(const value_form *form, const mbm_registe
     static decimal_number number;
     int is_nan;
 
-    if (!has_limits(form))
+    if (!conversion_has_limits(form->conversion))
         return NULL;
     if (!get_number(form, registers, address, &number, &is_nan) || !convert(form, &number))
         return "is no number";

@@ -60,9 +60,8 @@ const char *header_type(const mbm_planField *planned);
 /* The same of any number, also of a type that a plan does not know. */
 const char *header_number_type(const mbm_planField *planned);
 
-/* Whether a field has a scale that is a number; whether it has limits of what is written. */
+/* Whether a field has a scale that is a number. */
 int header_is_scaled(const device_field *field);
-int header_has_limits(const device_field *field);
 
 /* Writes a number that a file has as a decimal one, after `before`. */
 void header_write_number(FILE *out, const char *before, const value_scale *number);

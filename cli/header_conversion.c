@@ -164,7 +164,7 @@ static int write_constant(const header *h, uint16_t at, const char *lower)
 static void write_getters(const header *h, uint16_t at, const char *lower, const char *with)
 {
     const mbm_planField *planned = &h->of->planned[at];
-    const int is_several = planned->count > 1 && !device_is_part(planned);
+    const int is_several = device_values_in(planned) > 1;
     int is_decimal;
 
     if (planned->type == MBM_TYPE_TEXT) {

@@ -26,13 +26,6 @@ void header_write_limits(FILE *out, const device_field *field)
                             &of->step);
 }
 
-int header_has_limits(const device_field *field)
-{
-    const conversion *of = field->conversion;
-
-    return of && (of->has_least || of->has_most || of->has_step);
-}
-
 /* --- constants --- */
 
 /* A whole number, and whether something of the same sign is beyond it. */
@@ -165,7 +158,7 @@ int header_write_limit_constants(header *h, uint16_t at)
     const int is_turned = h->scales[at].multiplier < 0;
 
     /* With a power of ten in another field the registers' number is not known here. */
-    if (!header_has_limits(field) || field->power_name)
+    if (!conversion_has_limits(of) || field->power_name)
         return 1;
     return (!of->has_least ||
             write_limit(h, at, is_turned ? "_MAX" : "_MIN", &of->least, is_turned ? -1 : 1)) &&

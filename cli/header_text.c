@@ -198,7 +198,7 @@ static void write_what_it_is(header *h, uint16_t at)
         fputc('.', h->out);
     }
     header_write_meaning(h->out, field, "\n * Then ", ".");
-    if (header_has_limits(field)) {
+    if (conversion_has_limits(field->conversion)) {
         fprintf(h->out, "\n * What is written is ");
         header_write_limits(h->out, field);
         fputc('.', h->out);
@@ -386,7 +386,7 @@ static void write_page_row(const header *h, uint16_t at)
     if (field->unit_of_measurement)
         write_text(h->out, field->unit_of_measurement);
     fprintf(h->out, " | %s", PAGE_ACCESSES[field->access]);
-    if (header_has_limits(field)) {
+    if (conversion_has_limits(field->conversion)) {
         fputs(": ", h->out);
         header_write_limits(h->out, field);
     }
