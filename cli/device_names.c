@@ -27,76 +27,56 @@ static int make_one(yaml_file *file, device_field *field)
     return 1;
 }
 
-/* A field in an order of their names. */
+/* A field and what its name becomes: its topic or its identifier. */
 typedef struct named {
     const device_field *field;
+    const char *text;
 } named;
 
-/* Orders fields by topic or identifier, then by line. */
-static int compare_lines(const device_field *one, const device_field *other)
+/* Orders fields by what their names become, then by line. */
+static int compare(const void *one, const void *other)
 {
-    return (one->line > other->line) - (one->line < other->line);
+    const named *a = (const named *)one, *b = (const named *)other;
+    const int order = strcmp(a->text, b->text);
+
+    return order != 0 ? order
+                      : (a->field->line > b->field->line) - (a->field->line < b->field->line);
 }
 
-static int compare_topics(const void *one, const void *other)
-{
-    const device_field *a = ((const named *)one)->field;
-    const device_field *b = ((const named *)other)->field;
-    const int order = strcmp(a->topic, b->topic);
-
-    return order != 0 ? order : compare_lines(a, b);
-}
-
-static int compare_identifiers(const void *one, const void *other)
-{
-    const device_field *a = ((const named *)one)->field;
-    const device_field *b = ((const named *)other)->field;
-    const int order = strcmp(a->identifier, b->identifier);
-
-    return order != 0 ? order : compare_lines(a, b);
-}
-
-static int refuse_same(yaml_file *file, const device_field *first, const device_field *second,
-                       const char *text, const char *what)
-{
-    return yaml_file_refuse_line(file, second->line,
-                                 "the name %s and that of line %d, %s, become the same %s, %s: "
-                                 "choose another",
-                                 second->name, first->line, first->name, what, text);
-}
-
-static int check_all(yaml_file *file, named *sorted, uint16_t count)
+/* Sorts what names become, and refuses two that are the same. */
+static int check(yaml_file *file, named *all, uint16_t count, const char *what)
 {
     uint16_t i;
 
-    qsort(sorted, count, sizeof *sorted, compare_topics);
+    qsort(all, count, sizeof *all, compare);
     for (i = 1; i < count; i++)
-        if (strcmp(sorted[i - 1].field->topic, sorted[i].field->topic) == 0)
-            return refuse_same(file, sorted[i - 1].field, sorted[i].field, sorted[i].field->topic,
-                               "topic");
-    qsort(sorted, count, sizeof *sorted, compare_identifiers);
-    for (i = 1; i < count; i++)
-        if (strcmp(sorted[i - 1].field->identifier, sorted[i].field->identifier) == 0)
-            return refuse_same(file, sorted[i - 1].field, sorted[i].field,
-                               sorted[i].field->identifier, "identifier");
+        if (strcmp(all[i - 1].text, all[i].text) == 0)
+            return yaml_file_refuse_line(
+                file, all[i].field->line,
+                "the name %s and that of line %d, %s, become the same %s, %s: choose another",
+                all[i].field->name, all[i - 1].field->line, all[i - 1].field->name, what,
+                all[i].text);
     return 1;
 }
 
 int device_names_make(yaml_file *file, device *of)
 {
-    named *sorted;
+    named *all;
     uint16_t i;
     int is_right;
 
     for (i = 0; i < of->count; i++)
         if (!make_one(file, &of->fields[i]))
             return 0;
-    sorted = (named *)calloc(of->count + 1u, sizeof *sorted);
-    if (!sorted)
+    all = (named *)calloc(of->count + 1u, sizeof *all);
+    if (!all)
         return yaml_file_fail(file, ENOMEM);
     for (i = 0; i < of->count; i++)
-        sorted[i].field = &of->fields[i];
-    is_right = check_all(file, sorted, of->count);
-    free(sorted);
+        all[i] = (named){&of->fields[i], of->fields[i].topic};
+    is_right = check(file, all, of->count, "topic");
+    for (i = 0; i < of->count; i++)
+        all[i] = (named){&of->fields[i], of->fields[i].identifier};
+    is_right = is_right && check(file, all, of->count, "identifier");
+    free(all);
     return is_right;
 }
