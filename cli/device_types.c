@@ -87,9 +87,8 @@ static int read_range(const char *text, unsigned *first, unsigned *last)
 static int read_bits(yaml_file *file, const device_type_keys *keys, mbm_planField *planned)
 {
     const uint16_t registers = value_registers(planned->type, 1);
-    uint16_t words[VALUE_WORDS] = {0}, nth;
-    const uint64_t one = 1;
-    mbm_registers view;
+    const uint8_t wide = registers == 2 ? VALUE_BITS32 : VALUE_BITS64;
+    uint16_t nth = 0;
     unsigned first, last;
     const char *text;
 
@@ -113,12 +112,10 @@ static int read_bits(yaml_file *file, const device_type_keys *keys, mbm_planFiel
     planned->count = (uint16_t)(last - first + 1);
     planned->bit = (uint8_t)first;
     if (first / 16 != last / 16) {
-        planned->type = registers == 2 ? VALUE_BITS32 : VALUE_BITS64;
+        planned->type = wide;
         return 1;
     }
-    (void)mbm_registers_intoWords(&view, words, VALUE_WORDS, 0);
-    (void)mbm_registers_setBits(&view, 0, registers, planned->order, (uint8_t)first, 1, &one);
-    for (nth = 0; words[nth] == 0;)
+    while (registers > 1 && value_mask(wide, planned->order, (uint8_t)first, 1, nth) == 0)
         nth++;
     planned->address = (uint16_t)(planned->address + nth);
     planned->bit = (uint8_t)(first % 16);
