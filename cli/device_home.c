@@ -5,13 +5,14 @@
 
 #include "device_initial.h"
 #include "home.h"
+#include "numbers.h"
 
 #include <stdio.h>
 #include <string.h>
 
 enum { LONGEST_CLASS = 50, LONGEST_LIST = 1000 };
 
-/* Writes words with commas between them: names of classes, or units that "|" separates. */
+/* Write words with commas between them: names of classes, or units that "|" separates. */
 static const char *list_classes(const home_class *classes, unsigned count)
 {
     static char text[LONGEST_LIST];
@@ -48,10 +49,7 @@ static const char *list_units(const home_class *of)
 /* Returns what an entity is called in a sentence, such as "a switch". */
 static const char *entity_of(int component)
 {
-    static const char *const NAMES[] = {"a sensor", "a binary_sensor", "a number", "a switch",
-                                        "a select", "a text",          "a button"};
-
-    return NAMES[component];
+    return say("a %s", home_components[component]);
 }
 
 static int refuse_unit(yaml_file *file, const yaml_node_t *node, const home_class *of,
