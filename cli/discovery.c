@@ -81,35 +81,20 @@ static void range_of(const mbm_planField *planned, double *least, double *most)
     }
 }
 
-static double or_less(double number, double other)
-{
-    return number < other ? number : other;
-}
-
-static double or_more(double number, double other)
-{
-    return number > other ? number : other;
-}
-
 /* Adds what a number may be: what its type holds, or the limits of the file. */
 static void add_range(cJSON *to, const device_field *field, const mbm_planField *planned)
 {
     const int is_float = value_is_float(planned->type);
     const double scale = field->form.scale.digits != 0 ? field->form.scale.value : 1;
     const conversion *of = field->conversion;
-    double least, most, other, step = is_float ? 0.001 : fabs(scale);
-
-    range_of(planned, &least, &most);
     /* The device may change a power of ten. */
-    other = field->power_name ? pow(10, DEVICE_POWER) : is_float ? 1 : scale;
-    least *= other;
-    most *= other;
+    const double factor = field->power_name ? pow(10, DEVICE_POWER) : is_float ? 1 : scale;
+    double one, other, least, most, step = is_float || field->power_name ? 0.001 : fabs(scale);
+
+    range_of(planned, &one, &other);
     /* A negative scale turns the range. */
-    other = or_less(least, most);
-    most = or_more(least, most);
-    least = other;
-    if (field->power_name)
-        step = 0.001;
+    least = fmin(one * factor, other * factor);
+    most = fmax(one * factor, other * factor);
     if (of) {
         least = of->has_least ? of->least.value : least + of->offset.value;
         most = of->has_most ? of->most.value : most + of->offset.value;
@@ -118,7 +103,7 @@ static void add_range(cJSON *to, const device_field *field, const mbm_planField 
     cJSON_AddNumberToObject(to, "min", least);
     cJSON_AddNumberToObject(to, "max", most);
     /* Home Assistant has no smaller step. */
-    cJSON_AddNumberToObject(to, "step", or_more(step, 0.001));
+    cJSON_AddNumberToObject(to, "step", fmax(step, 0.001));
     cJSON_AddStringToObject(to, "mode", "box");
 }
 
@@ -192,15 +177,23 @@ static const char *template_of(const mbm_planField *planned, int is_plain)
 
 /* --- the names of numbers --- */
 
-/* Writes a text as a literal of Jinja, which the literals of JSON are. */
-static void write_literal(FILE *out, const char *text)
+/* Returns a text as a literal of JSON, for cJSON_free, or NULL without memory. */
+static char *literal_of(const char *text)
 {
     cJSON *string = cJSON_CreateString(text);
     char *literal = cJSON_PrintUnformatted(string);
 
+    cJSON_Delete(string);
+    return literal;
+}
+
+/* Writes a text as a literal of Jinja, which the literals of JSON are. */
+static void write_literal(FILE *out, const char *text)
+{
+    char *literal = literal_of(text);
+
     fputs(literal ? literal : "\"\"", out);
     cJSON_free(literal);
-    cJSON_Delete(string);
 }
 
 /* A template looks up one of these: a number, as JSON or as a text, or a name. */
@@ -270,14 +263,12 @@ static void add_class(cJSON *to, const device_field *one, const mbm_planField *p
 /* Adds what a button sends: the value, of a text as a JSON string. */
 static void add_press(cJSON *to, const device_field *one, const mbm_planField *planned)
 {
-    cJSON *string = cJSON_CreateString(one->press);
-    char *literal = cJSON_PrintUnformatted(string);
+    char *literal = literal_of(one->press);
 
     if (literal)
         cJSON_AddStringToObject(to, "payload_press",
                                 value_is_text(planned->type) ? literal : one->press);
     cJSON_free(literal);
-    cJSON_Delete(string);
 }
 
 /* --- state and command --- */
