@@ -1,5 +1,6 @@
 """mbm poll --watch in a terminal, and mbm poll --http with any visitor: what they show, and that nothing outlasts them."""
 
+import codecs
 import fcntl
 import json
 import os
@@ -132,8 +133,6 @@ class Terminal:
         fcntl.ioctl(self.ours, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     def read(self):
-        import codecs
-
         decoder = codecs.getincrementaldecoder("utf-8")()
         while True:
             if not select.select([self.ours], [], [], 0.2)[0]:

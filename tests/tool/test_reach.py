@@ -25,24 +25,18 @@ class Device(TcpDevice):
     def serve(self, peer):
         self.count = 0
         self.connections += 1
-        try:
-            stream = peer.makefile("rb")
-            while len(head := stream.read(7)) == 7:
-                pdu = stream.read(int.from_bytes(head[4:6], "big") - 1)
-                self.times.append(time.monotonic())
-                self.asked.append((head[6], pdu.hex()))
-                self.turn += 1
-                if self.silent(self.turn):
-                    continue
-                self.count += 1
-                transaction = int.from_bytes(head[:2], "big")
-                if self.renumber:
-                    transaction = self.renumber(self.count)
-                unit = head[6] if self.reunit is None else self.reunit
-                time.sleep(self.late)
-                peer.sendall(tcp_frame(transaction, unit, self.answer_to(pdu)))
-        except OSError:
-            pass
+        super().serve(peer)
+
+    def reply(self, head, pdu):
+        self.times.append(time.monotonic())
+        self.asked.append((head[6], pdu.hex()))
+        self.turn += 1
+        if self.silent(self.turn):
+            return None
+        self.count += 1
+        transaction = self.renumber(self.count) if self.renumber else int.from_bytes(head[:2], "big")
+        time.sleep(self.late)
+        return tcp_frame(transaction, head[6] if self.reunit is None else self.reunit, self.answer_to(pdu))
 
     def answer_to(self, pdu):
         if self.busy:

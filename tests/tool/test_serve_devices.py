@@ -9,7 +9,7 @@ import time
 
 import pytest
 from masters import QUIET, Asker, framed, mbpoll, outcome, port_of, pymodbus_client
-from peers import (CERTIFICATES, DONE, EXCEPTION, LINE, NO_REPLY, PATIENCE, PATIENT, READ, WRONG, Client, Wire, number, tcp_frame, wait)
+from peers import (DONE, EXCEPTION, LINE, NO_REPLY, PATIENCE, PATIENT, READ, WRONG, Client, Wire, number, tcp_frame, tls_line, wait)
 
 TCP, UDP, RTU_OVER_TCP = "tcp://127.0.0.1:0", "udp://127.0.0.1:0", "rtu+tcp://127.0.0.1:0"
 BUSY = b"\x83\x06"
@@ -263,9 +263,8 @@ def test_a_device_has_one_connection_at_a_time(client):
 
 
 def test_devices_behind_tls_close_and_count_connections_too(mbm):
-    keys = lambda name: f"?ca={CERTIFICATES}/authority.pem&cert={CERTIFICATES}/{name}.pem&key={CERTIFICATES}/{name}.key.pem"
-    place = mbm.serve(f"tls://127.0.0.1:0{keys('server')}", "--echo", "--fault", "close-after=1", "--fault", "connections=1", "--fault", "unit=1")
-    code, out, error = mbm("read", place + keys("operator"), 0, "--every", "300ms", "--times", 3, "--csv", *PATIENT)
+    place = mbm.serve(tls_line(0, "server"), "--echo", "--fault", "close-after=1", "--fault", "connections=1", "--fault", "unit=1")
+    code, out, error = mbm("read", tls_line(port_of(place), "operator"), 0, "--every", "300ms", "--times", 3, "--csv", *PATIENT)
     assert code == DONE and out.count(",success,") == 3, out + error
 
 
