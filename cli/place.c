@@ -89,12 +89,23 @@ static int read_tls_key(place *p, const char *key, const char *value, const char
     return to != NULL;
 }
 
+static int read_reach_key(place *p, const char *key, const char *value, const char **wrong)
+{
+    int i;
+
+    for (i = 0; i < REACH_KEYS; i++)
+        if (strcmp(key, reach_names[i]) == 0) {
+            *wrong = reach_read(&p->reach, i, value);
+            return 1;
+        }
+    return 0;
+}
+
 /* Reads KEY=VALUE&KEY=VALUE. */
 static const char *read_keys(place *p, char *keys, int is_server)
 {
     char *rest, *word;
     char seen[400] = "&";
-    int i;
 
     for (word = strtok_r(keys, "&", &rest); word; word = strtok_r(NULL, "&", &rest)) {
         char *value = strchr(word, '='), key[32];
@@ -107,11 +118,8 @@ static const char *read_keys(place *p, char *keys, int is_server)
         is_known = place_is_serial(p)     ? read_serial_key(p, word, value, &wrong)
                    : p->kind == PLACE_TLS ? read_tls_key(p, word, value, &wrong)
                                           : 0;
-        for (i = 0; i < REACH_KEYS && !is_known && !is_server; i++)
-            if (strcmp(word, reach_names[i]) == 0) {
-                wrong = reach_read(&p->reach, i, value);
-                is_known = 1;
-            }
+        if (!is_known && !is_server)
+            is_known = read_reach_key(p, word, value, &wrong);
         if (!is_known && !*kinds[p->kind].keys && is_server)
             return say("%s: \"%s\" is unknown: %s has no keys", p->text, word,
                        kinds[p->kind].scheme);
@@ -227,10 +235,8 @@ const char *place_read(place *p, const char *text, int is_server)
         const reach_line line = place_reach(p, 1);
 
         wrong = reach_check(&p->reach, &line, "");
-        if (wrong) {
-            snprintf(copy, sizeof copy, "%s", wrong);
-            wrong = say("%s: %s", text, copy);
-        }
+        if (wrong)
+            wrong = say("%s: %s", text, wrong);
     }
     return wrong;
 }
