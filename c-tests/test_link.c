@@ -14,11 +14,7 @@ TEST(a_link_is_opened_in_the_first_poll)
         assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
         assert_int_equal(mbm_client_isConnected(&client), 1);
         assert_string_equal(events, "C00 ");
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-        assert_int_equal(words[0], 0x1234);
+        reads_right(framings[i]);
     }
 }
 
@@ -389,10 +385,7 @@ TEST(a_client_without_its_link_works_as_before)
         m.is_lost = 1;
         OK(mbm_client_poll(&client));
         m.is_lost = 0;
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        reads_right(framings[i]);
         m.is_lost = 1;
         queue_read(&request);
         IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 1000));

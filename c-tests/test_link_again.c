@@ -9,10 +9,7 @@ static const uint8_t streams[] = {MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
 static void begin_good(int framing)
 {
     begin_up(framing);
-    queue_read(&request);
-    memory_port_send(&m, &client);
-    answer(framing);
-    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    reads_right(framing);
     run(2000);
     m.sent_count = 0;
     connects = disconnects = 0;

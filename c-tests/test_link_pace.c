@@ -1,15 +1,6 @@
 /* A link that rests after it was opened, and one that is closed although it is good. */
 #include "linked.h"
 
-static void reads_right(int framing)
-{
-    queue_read(&request);
-    memory_port_send(&m, &client);
-    answer(framing);
-    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-    assert_int_equal(words[0], 0x1234);
-}
-
 TEST(no_request_is_sent_before_the_delay_after_connecting_is_over)
 {
     for (unsigned i = 0; i < COUNT(framings); i++) {

@@ -1,31 +1,8 @@
 /* Values with a conversion: of a plan, and of registers that were read without one. */
-#include "plan_device.h"
-#include "test.h"
+#include "plan_fields.h"
 
 #include <math.h>
 #include <string.h>
-
-enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
-
-static plan_device d;
-
-static void rtu(void)
-{
-    plan_device_begin(&d, 0);
-}
-
-fixture each_test = {rtu, NULL};
-
-static mbm_planField *add(uint8_t type, uint16_t address)
-{
-    return plan_device_add(&d, 1, HOLDING, type, address, 1000);
-}
-
-static void read_all(void)
-{
-    plan_device_start(&d);
-    plan_device_run(&d, 200);
-}
 
 static void put_float(uint16_t address, float value)
 {

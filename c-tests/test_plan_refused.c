@@ -1,24 +1,7 @@
 /* A plan refuses these, and changes nothing then; calls from within its hooks. */
 #include "refused.h"
 #include "hooked_port.h"
-#include "plan_device.h"
-#include "test.h"
-
-enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS };
-
-static plan_device d;
-
-static void rtu(void)
-{
-    plan_device_begin(&d, 0);
-}
-
-fixture each_test = {rtu, NULL};
-
-static mbm_planField *add(uint8_t type, uint16_t address)
-{
-    return plan_device_add(&d, 1, HOLDING, type, address, 1000);
-}
+#include "plan_fields.h"
 
 static void refuses(uint8_t status, uint16_t wrong)
 {

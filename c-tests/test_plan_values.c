@@ -1,30 +1,7 @@
 /* The values of a plan in every type and order, and its reads. */
-#include "plan_device.h"
-#include "test.h"
+#include "plan_fields.h"
 
 #include <math.h>
-
-enum { HOLDING = MBM_TABLE_HOLDING_REGISTERS, COILS = MBM_TABLE_COILS };
-
-static plan_device d;
-
-static void rtu(void)
-{
-    plan_device_begin(&d, 0);
-}
-
-fixture each_test = {rtu, NULL};
-
-static mbm_planField *add(uint8_t type, uint16_t address)
-{
-    return plan_device_add(&d, 1, type == MBM_TYPE_BIT ? COILS : HOLDING, type, address, 1000);
-}
-
-static void read_all(void)
-{
-    plan_device_start(&d);
-    plan_device_run(&d, 200);
-}
 
 /* Registers of a number, the most significant first, as a device with `order` has them. */
 static void put(uint16_t address, uint64_t number, unsigned registers, uint8_t order)

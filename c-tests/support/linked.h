@@ -138,6 +138,16 @@ static inline void answer(int framing)
     }
 }
 
+/* Sends a read and delivers its right reply. */
+static inline void reads_right(int framing)
+{
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_int_equal(words[0], 0x1234);
+}
+
 /* Polls for a time, each time after the time of pollDelay. */
 static inline void run(uint32_t ms)
 {
