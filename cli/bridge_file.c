@@ -3,6 +3,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "bridge_file.h"
 
+#include "device_plan.h"
 #include "numbers.h"
 #include "report.h"
 
@@ -138,7 +139,9 @@ int bridge_setup_options(const bridge_setup *of, broker_options *to)
 
 int bridge_setup_gap(const bridge_setup *of)
 {
-    return of->values[BRIDGE_GAP] ? (int)strtoul(of->values[BRIDGE_GAP], NULL, 10) : -1;
+    const char *text = of->values[BRIDGE_GAP];
+
+    return text ? (int)strtoul(text, NULL, 10) : DEVICE_PLAN_OWN_GAP;
 }
 
 uint8_t bridge_setup_function(const bridge_setup *of)

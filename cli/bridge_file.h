@@ -65,14 +65,16 @@ const char *bridge_setup_check(const bridge_setup *of, const char *dash);
  * memory. */
 int bridge_setup_options(const bridge_setup *of, broker_options *to);
 
-/* The registers that one read may cover beside its fields, -1 if that is not given, and whether a
- * setting is yes. */
+/* Whether a setting is yes. */
+int bridge_setup_is(const bridge_setup *of, int setting);
+
+/* The registers that one read may cover beside its fields; DEVICE_PLAN_OWN_GAP if that is not
+ * given. */
 int bridge_setup_gap(const bridge_setup *of);
 
 /* By which function fields are written whose device file does not say it: one of DEVICE_BY_SIZE,
  * DEVICE_SINGLE and DEVICE_MULTIPLE. */
 uint8_t bridge_setup_function(const bridge_setup *of);
-int bridge_setup_is(const bridge_setup *of, int setting);
 
 /* Reads a file. `into` has the settings of the command line, which the file may replace, and no
  * line. Returns CODE_DONE; or CODE_SYSTEM or CODE_WRONG with the reason in `wrong`. */

@@ -283,9 +283,10 @@ static void on_update(void *context, mbm_plan *ended, uint16_t field)
 {
     bridge_line *l = (bridge_line *)context;
     const int is_new = take_value(l, field) || l->bridge->is_every;
+    const uint8_t status = mbm_plan_getStatus(ended, field, NULL);
 
-    update_unit(l, field, mbm_plan_getStatus(ended, field, NULL));
-    log_refused(l, field, mbm_plan_getStatus(ended, field, NULL));
+    update_unit(l, field, status);
+    log_refused(l, field, status);
     if (is_new)
         publish_value(l, field);
     if (l->table->fields.fields[field].is_power)

@@ -43,8 +43,8 @@ typedef struct bridge_table {
     mbm_planSplitting splitting;
 } bridge_table;
 
-/* Reads a device file for the bridge, and checks that a plan can read it. `register_gap` -1 is that
- * of the file; `function` writes the fields whose file does not say how. Returns NULL after a
+/* Reads a device file for the bridge, and checks that a plan can read it. `register_gap` is that of
+ * device_plan_make; `function` writes the fields whose file does not say how. Returns NULL after a
  * failure; `code` has its exit code and `wrong` the reason, a sentence without its full stop. */
 bridge_table *bridge_table_read(const char *path, int register_gap, uint8_t function, int *code,
                                 char wrong[YAML_FILE_WRONG_BYTES]);
