@@ -113,6 +113,15 @@ static void files_and_queues(void)
     ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x15, written, sizeof written));
     ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x14, groups, sizeof groups));
     assert_reply(&r, records, sizeof records);
+    /* The same by name: the groups without their byte count, and the words without it. */
+    r.data = written + 1;
+    ends(MBM_OK, &r, mbm_client_writeFileRecords(c, &r, sizeof written - 1));
+    assert_int_equal(r.length, 0);
+    r.data = groups + 1;
+    ends(MBM_OK, &r, mbm_client_readFileRecords(c, &r, sizeof groups - 1));
+    assert_reply(&r, records + 1, sizeof records - 1);
+    r.data = "\6\0\4\0\x13\0\2\6\0\4\0\1\0\1";
+    ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFileRecords(c, &r, 14));
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFileRecord(c, &r, 4, 19, 2));
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readFifoQueue(c, &r, 0x04DF));
 }
@@ -138,6 +147,12 @@ static void identities_and_diagnostics(void)
     ends(MBM_ILLEGAL_DATA_ADDRESS, &r, mbm_client_readDeviceIdentification(c, &r, 4, 0x44));
     ends(MBM_OK, &r, mbm_client_forward(c, &r, 0x2B, (const uint8_t *)"\x0E\x04\x80", 3));
     assert_reply(&r, "\x0E\x04\x83\x00\x00\x01\x80\x03own", 11);
+    r.data = "\x04\x80";
+    ends(MBM_OK, &r,
+         mbm_client_encapsulatedInterfaceTransport(c, &r, MBM_MEI_READ_DEVICE_IDENTIFICATION, 2));
+    assert_reply(&r, "\x04\x83\x00\x00\x01\x80\x03own", 10);
+    ends(MBM_ILLEGAL_FUNCTION, &r,
+         mbm_client_encapsulatedInterfaceTransport(c, &r, MBM_MEI_CANOPEN, 2));
     r.data = own;
     ends(MBM_OK, &r, mbm_client_custom(c, &r, SERVED_ECHO, 8, &eight));
     assert_reply(&r, own, 8);

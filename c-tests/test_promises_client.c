@@ -228,6 +228,34 @@ TEST(functions_with_bodies_check_them)
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 123));
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 0));
     WITHIN(0, mbm_client_writeFileRecord(&c, &r, 0, 0, 1));
+    WITHIN(1, mbm_client_readFileRecords(&c, &r, 7));
+    WITHIN(1, mbm_client_readFileRecords(&c, &r, 245));
+    WITHIN(0, mbm_client_readFileRecords(&c, &r, 0));
+    WITHIN(0, mbm_client_readFileRecords(&c, &r, 8));
+    WITHIN(0, mbm_client_readFileRecords(&c, &r, 252));
+    WITHIN(0, mbm_client_readFileRecords(&c, &r, 256 + 7));
+    WITHIN(1, mbm_client_writeFileRecords(&c, &r, 9));
+    WITHIN(1, mbm_client_writeFileRecords(&c, &r, 251));
+    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 8));
+    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 252));
+    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 256 + 9));
+    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 0));
+    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, 255, 251));
+    WITHIN(0, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 252));
+    WITHIN(0, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 256));
+    r.data = NULL;
+    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_readFileRecords(&c, &r, 7));
+    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_writeFileRecords(&c, &r, 9));
+    ANSWERS(MBM_INVALID_ARGUMENT,
+            mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 1));
+    ANSWERS(MBM_PENDING, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 0));
+    r.data = bytes;
+    r.unit = 0;
+    ANSWERS(MBM_BROADCAST_NOT_ALLOWED, mbm_client_readFileRecords(&c, &r, 7));
+    ANSWERS(MBM_PENDING, mbm_client_writeFileRecords(&c, &r, 9));
+    ANSWERS(MBM_BROADCAST_NOT_ALLOWED,
+            mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 1));
+    r.unit = 17;
     ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 0, bytes, 1));
     ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 128, bytes, 1));
     ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_forward(&c, &r, 0x41, NULL, 1));

@@ -11,6 +11,7 @@ static mbm_registers r;
 /* A value of any type, large enough for each. */
 static union {
     uint8_t bytes[16];
+    int8_t int8;
     uint16_t uint16;
     uint32_t uint32;
     uint64_t uint64;
@@ -59,6 +60,10 @@ typedef struct accessor {
     }
 
 GETS(getBit, (v, address, 15, value.bytes), (v, FIRST, 15, NULL))
+GETS(getUint8, (v, address, 1, value.bytes), (v, FIRST, 1, NULL))
+GETS(getInt8, (v, address, 0, &value.int8), (v, FIRST, 0, NULL))
+GETS(isEqualBytes, (v, address, (const uint8_t *)"five", 3, value.bytes),
+     (v, FIRST, (const uint8_t *)"five", 3, NULL))
 GETS(getUint16, (v, address, order, &value.uint16), (v, FIRST, 0, NULL))
 GETS(getUint32, (v, address, order, &value.uint32), (v, FIRST, 0, NULL))
 GETS(getUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
@@ -67,6 +72,8 @@ GETS(getDouble, (v, address, order, &value.wide), (v, FIRST, 0, NULL))
 GETS(getString, (v, address, 5, order, value.text, 6), (v, FIRST, 5, 0, NULL, 6))
 GETS(getBytes, (v, address, order, value.bytes, 5), (v, FIRST, 0, NULL, 5))
 GETS(setBit, (v, address, 15, 1), (NULL, FIRST, 15, v != NULL))
+GETS(setUint8, (v, address, 0, 200), (NULL, FIRST, 0, v != NULL))
+GETS(setInt8, (v, address, 1, -100), (NULL, FIRST, 1, v != NULL))
 GETS(setUint16, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
 GETS(setUint32, (v, address, order, 9), (NULL, FIRST, 0, v != NULL))
 GETS(setUint64, (v, address, order, &value.uint64), (v, FIRST, 0, NULL))
@@ -109,27 +116,30 @@ GETS(setIecDate, (v, address, 3, order, &noon), (v, FIRST, 3, 0, NULL))
     }
 
 static const accessor accessors[] = {
-    ROW(getBit, 1, 0, 0, 0),           ROW(getUint16, 1, 1, 0, 0),
-    ROW(getUint32, 2, 1, 0, 0),        ROW(getUint64, 4, 1, 0, 0),
-    ROW(getFloat, 2, 1, 0, 0),         ROW(getDouble, 4, 1, 0, 0),
-    ROW(getString, 3, 1, 0, 0),        ROW(getBytes, 3, 1, 0, 0),
-    ROW(setBit, 1, 0, 1, 0),           ROW(setUint16, 1, 1, 1, 0),
-    ROW(setUint32, 2, 1, 1, 0),        ROW(setUint64, 4, 1, 1, 0),
-    ROW(setFloat, 2, 1, 1, 0),         ROW(setDouble, 4, 1, 1, 0),
-    ROW(setString, 3, 1, 1, 0),        ROW(setBytes, 3, 1, 1, 0),
-    ROW(getBcd, 2, 1, 0, 0),           ROW(getM10k, 4, 1, 0, 0),
-    ROW(getSignedM10k, 2, 1, 0, 0),    ROW(getUint24, 2, 1, 0, 0),
-    ROW(getInt24, 2, 1, 0, 0),         ROW(getUint48, 3, 1, 0, 1),
-    ROW(getInt48, 3, 1, 0, 1),         ROW(getSignMagnitude, 1, 1, 0, 0),
-    ROW(getHalf, 1, 1, 0, 0),          ROW(getBits, 2, 1, 0, 0),
-    ROW(getText, 3, 1, 0, 0),          ROW(getDate, 2, 1, 0, 0),
-    ROW(getIecDate, 3, 1, 0, 1),       ROW(setBcd, 2, 1, 1, 0),
-    ROW(setM10k, 4, 1, 1, 0),          ROW(setSignedM10k, 2, 1, 1, 0),
-    ROW(setUint24, 2, 1, 1, 0),        ROW(setInt24, 2, 1, 1, 0),
-    ROW(setUint48, 3, 1, 1, 1),        ROW(setInt48, 3, 1, 1, 1),
-    ROW(setSignMagnitude, 1, 1, 1, 0), ROW(setHalf, 1, 1, 1, 0),
-    ROW(setBits, 2, 1, 1, 0),          ROW(setText, 3, 1, 1, 0),
-    ROW(setDate, 2, 1, 1, 0),          ROW(setIecDate, 3, 1, 1, 1)};
+    ROW(getUint8, 1, 0, 0, 0),         ROW(getInt8, 1, 0, 0, 0),
+    ROW(isEqualBytes, 2, 0, 0, 0),     ROW(setUint8, 1, 0, 1, 0),
+    ROW(setInt8, 1, 0, 1, 0),          ROW(getBit, 1, 0, 0, 0),
+    ROW(getUint16, 1, 1, 0, 0),        ROW(getUint32, 2, 1, 0, 0),
+    ROW(getUint64, 4, 1, 0, 0),        ROW(getFloat, 2, 1, 0, 0),
+    ROW(getDouble, 4, 1, 0, 0),        ROW(getString, 3, 1, 0, 0),
+    ROW(getBytes, 3, 1, 0, 0),         ROW(setBit, 1, 0, 1, 0),
+    ROW(setUint16, 1, 1, 1, 0),        ROW(setUint32, 2, 1, 1, 0),
+    ROW(setUint64, 4, 1, 1, 0),        ROW(setFloat, 2, 1, 1, 0),
+    ROW(setDouble, 4, 1, 1, 0),        ROW(setString, 3, 1, 1, 0),
+    ROW(setBytes, 3, 1, 1, 0),         ROW(getBcd, 2, 1, 0, 0),
+    ROW(getM10k, 4, 1, 0, 0),          ROW(getSignedM10k, 2, 1, 0, 0),
+    ROW(getUint24, 2, 1, 0, 0),        ROW(getInt24, 2, 1, 0, 0),
+    ROW(getUint48, 3, 1, 0, 1),        ROW(getInt48, 3, 1, 0, 1),
+    ROW(getSignMagnitude, 1, 1, 0, 0), ROW(getHalf, 1, 1, 0, 0),
+    ROW(getBits, 2, 1, 0, 0),          ROW(getText, 3, 1, 0, 0),
+    ROW(getDate, 2, 1, 0, 0),          ROW(getIecDate, 3, 1, 0, 1),
+    ROW(setBcd, 2, 1, 1, 0),           ROW(setM10k, 4, 1, 1, 0),
+    ROW(setSignedM10k, 2, 1, 1, 0),    ROW(setUint24, 2, 1, 1, 0),
+    ROW(setInt24, 2, 1, 1, 0),         ROW(setUint48, 3, 1, 1, 1),
+    ROW(setInt48, 3, 1, 1, 1),         ROW(setSignMagnitude, 1, 1, 1, 0),
+    ROW(setHalf, 1, 1, 1, 0),          ROW(setBits, 2, 1, 1, 0),
+    ROW(setText, 3, 1, 1, 0),          ROW(setDate, 2, 1, 1, 0),
+    ROW(setIecDate, 3, 1, 1, 1)};
 
 /* Asserts that a call returns a status, and changes neither value, words nor view. */
 #define NOTHING(status, what)                                                                      \
@@ -233,6 +243,70 @@ TEST(a_register_has_sixteen_bits_and_two_bytes)
     assert_int_equal(on, 0x11);
     OK(mbm_registers_getBytes(&r, FIRST, MBM_ORDER_ABCD, &on, 1));
     assert_int_equal(on, 0x22);
+}
+
+TEST(a_byte_of_a_register_is_the_high_or_the_low_one_in_every_order)
+{
+    uint8_t byte;
+    int8_t small;
+
+    for (uint8_t order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBAHGFE; order++) {
+        OK(mbm_registers_setByteOrder(&r, order));
+        words[1] = 0x80FE;
+        OK(mbm_registers_getUint8(&r, FIRST + 1, 1, &byte));
+        assert_int_equal(byte, 0x80);
+        OK(mbm_registers_getUint8(&r, FIRST + 1, 0, &byte));
+        assert_int_equal(byte, 0xFE);
+        OK(mbm_registers_getInt8(&r, FIRST + 1, 200, &small));
+        assert_int_equal(small, -128);
+        OK(mbm_registers_getInt8(&r, FIRST + 1, 0, &small));
+        assert_int_equal(small, -2);
+        OK(mbm_registers_setUint8(&r, FIRST + 1, 200, 0x12));
+        assert_int_equal(words[1], 0x12FE);
+        OK(mbm_registers_setInt8(&r, FIRST + 1, 0, -128));
+        assert_int_equal(words[1], 0x1280);
+    }
+}
+
+TEST(registers_are_compared_with_bytes_in_the_order_of_the_wire)
+{
+    static const uint8_t three[] = {1, 2, 3};
+    uint8_t equal = 7;
+
+    words[0] = 0x0102;
+    words[1] = 0x03AA;
+    for (uint8_t order = MBM_ORDER_DEFAULT; order <= MBM_ORDER_DCBAHGFE; order++) {
+        OK(mbm_registers_setByteOrder(&r, order));
+        words[1] = 0x03AA;
+        OK(mbm_registers_isEqualBytes(&r, FIRST, three, 3, &equal));
+        assert_int_equal(equal, 1);
+        words[1] = 0x04AA;
+        OK(mbm_registers_isEqualBytes(&r, FIRST, three, 3, &equal));
+        assert_int_equal(equal, 0);
+    }
+    OK(mbm_registers_isEqualBytes(&r, FIRST, NULL, 0, &equal));
+    assert_int_equal(equal, 1);
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_isEqualBytes(&r, FIRST, three, 3, NULL));
+}
+
+TEST(the_order_of_a_view_is_that_of_calls_without_one)
+{
+    uint32_t number;
+
+    words[0] = 0x5652;
+    words[1] = 0xAE41;
+    OK(mbm_registers_setByteOrder(&r, MBM_ORDER_CDAB));
+    OK(mbm_registers_getUint32(&r, FIRST, MBM_ORDER_DEFAULT, &number));
+    assert_int_equal(number, 0xAE415652);
+    OK(mbm_registers_getUint32(&r, FIRST, MBM_ORDER_ABCD, &number));
+    assert_int_equal(number, 0x5652AE41);
+    OK(mbm_registers_setByteOrder(&r, MBM_ORDER_DEFAULT));
+    OK(mbm_registers_getUint32(&r, FIRST, MBM_ORDER_DEFAULT, &number));
+    assert_int_equal(number, 0x5652AE41);
+    REFUSED(MBM_INVALID_ARGUMENT, r, mbm_registers_setByteOrder(&r, MBM_ORDER_DCBAHGFE + 1));
+    IS(MBM_INVALID_ARGUMENT, mbm_registers_setByteOrder(NULL, MBM_ORDER_ABCD));
+    r.data = NULL;
+    REFUSED(MBM_NOT_INITIALISED, r, mbm_registers_setByteOrder(&r, MBM_ORDER_ABCD));
 }
 
 TEST(a_text_ends_at_its_nul_or_with_its_field)

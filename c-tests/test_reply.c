@@ -48,17 +48,6 @@ static void use_bytes(const mbm_packet *packet)
         memcpy(data, packet->data, packet->dataLength);
 }
 
-/* Queues a request whose data follow one byte. */
-static uint8_t forward_after(const mbm_packet *p, uint8_t first)
-{
-    static uint8_t body[MBM_MAX_PDU];
-
-    body[0] = first;
-    if (p->dataLength > 0)
-        memcpy(body + 1, p->data, p->dataLength);
-    return mbm_client_forward(&client, &request, p->function, body, (uint16_t)(p->dataLength + 1));
-}
-
 /* Queues the request that a packet describes. */
 static uint8_t ask(const mbm_packet *p)
 {
@@ -82,8 +71,8 @@ static uint8_t ask(const mbm_packet *p)
     case 0x0F: return mbm_client_writeMultipleCoils(c, r, p->address, p->quantity);
     case 0x10: use_words(p); return mbm_client_writeMultipleRegisters(c, r, p->address, words);
     case 0x11: return mbm_client_reportServerId(c, r);
-    case 0x14:
-    case 0x15: return forward_after(p, (uint8_t)bytes);
+    case 0x14: return mbm_client_readFileRecords(c, r, bytes);
+    case 0x15: return mbm_client_writeFileRecords(c, r, bytes);
     case 0x16: return mbm_client_maskWriteRegister(c, r, p->address, p->andMask, p->orMask);
     case 0x17:
         use_words(p);
@@ -93,7 +82,7 @@ static uint8_t ask(const mbm_packet *p)
     case 0x2B:
         if (p->meiType == MBM_MEI_READ_DEVICE_IDENTIFICATION)
             return mbm_client_readDeviceIdentification(c, r, p->readDeviceIdCode, p->objectId);
-        return forward_after(p, p->meiType);
+        return mbm_client_encapsulatedInterfaceTransport(c, r, p->meiType, bytes);
     default: return mbm_client_custom(c, r, p->function, bytes, &any_length);
     }
 }

@@ -88,8 +88,11 @@ void every_client_request_returns(uint8_t status, mbm_client *c, mbm_clientReque
     RETURNS(mbm_client_reportServerId(c, r));
     RETURNS(mbm_client_readFileRecord(c, r, 1, 0, 1));
     RETURNS(mbm_client_writeFileRecord(c, r, 1, 0, 1));
+    RETURNS(mbm_client_readFileRecords(c, r, 7));
+    RETURNS(mbm_client_writeFileRecords(c, r, 9));
     RETURNS(mbm_client_readFifoQueue(c, r, 0));
     RETURNS(mbm_client_readDeviceIdentification(c, r, 1, 0));
+    RETURNS(mbm_client_encapsulatedInterfaceTransport(c, r, MBM_MEI_CANOPEN, 1));
     RETURNS(mbm_client_custom(c, r, 65, 1, &silence));
     RETURNS(mbm_client_forward(c, r, 65, &byte, 1));
 }

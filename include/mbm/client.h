@@ -686,6 +686,27 @@ uint8_t mbm_client_writeFileRecord(mbm_client *client, mbm_clientRequest *reques
                                    uint16_t record, uint16_t quantity);
 
 /**
+ * Function 14 with several groups: reads records of several files, or of several ranges.
+ * `data` contains the groups as on the wire, seven bytes each, as mbm_packet_addRecord
+ * builds them. `reply` receives the sub-responses as on the wire: of each group its length
+ * after this byte, the reference type 6, and the words, the high byte first (V1.1b3, 6.14).
+ *
+ * @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_readFileRecords(mbm_client *client, mbm_clientRequest *request, uint16_t bytes);
+
+/**
+ * Function 15 with several groups: writes records of several files, or of several ranges.
+ * `data` contains the groups as on the wire, as mbm_packet_addRecord builds them (V1.1b3,
+ * 6.15).
+ *
+ * @param bytes  the number of bytes of `data`, 9 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_writeFileRecords(mbm_client *client, mbm_clientRequest *request, uint16_t bytes);
+
+/**
  * Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
  * 6.18).
  *
@@ -705,6 +726,18 @@ uint8_t mbm_client_readFifoQueue(mbm_client *client, mbm_clientRequest *request,
  */
 uint8_t mbm_client_readDeviceIdentification(mbm_client *client, mbm_clientRequest *request,
                                             uint8_t code, uint8_t object);
+
+/**
+ * Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
+ * bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
+ * the response.
+ *
+ * @param meiType  the MEI type, for example MBM_MEI_CANOPEN, 0 to 255
+ * @param bytes    the number of bytes of `data`, 0 to 251
+ * @return a status; see mbm_client_readCoils
+ */
+uint8_t mbm_client_encapsulatedInterfaceTransport(mbm_client *client, mbm_clientRequest *request,
+                                                  uint8_t meiType, uint16_t bytes);
 
 /**
  * Any function code: sends the bytes of `data` after the function code, and reads the bytes

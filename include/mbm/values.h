@@ -234,6 +234,14 @@ uint8_t mbm_registers_intoBytes(mbm_registers *registers, uint8_t *bytes, uint16
                                 uint16_t first);
 
 /**
+ * Sets the order of the values that calls with MBM_ORDER_DEFAULT read and write.
+ *
+ * @param registers  the view, filled in
+ * @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for MBM_ORDER_ABCD
+ */
+uint8_t mbm_registers_setByteOrder(mbm_registers *registers, uint8_t order);
+
+/**
  * Reads a date, or a time of day, from registers of which `layout` says what they hold. It has
  * a letter for each register, or two for its high and low byte, and a space between two
  * registers: "Y M D h m s" are six registers, "yM Dh ms" three.
@@ -317,6 +325,36 @@ uint8_t mbm_date_setSeconds(mbm_date *date, const int64_t *seconds);
  */
 uint8_t mbm_registers_getBit(const mbm_registers *registers, uint16_t address, uint8_t bit,
                              uint8_t *on);
+
+/**
+ * Reads one byte of a register, 0 to 255.
+ *
+ * @param address  the device's address of the register
+ * @param high     0 for the low byte, anything else for the high byte, which is transmitted
+ *                 first. No order of `registers` exchanges them
+ * @param value    receives the byte
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_getUint8(const mbm_registers *registers, uint16_t address, uint8_t high,
+                               uint8_t *value);
+
+/** As mbm_registers_getUint8, for a signed byte in two's complement, -128 to 127. */
+uint8_t mbm_registers_getInt8(const mbm_registers *registers, uint16_t address, uint8_t high,
+                              int8_t *value);
+
+/**
+ * Compares registers with bytes, in the order of the wire: the high byte of each register
+ * first, whatever the order of `registers`.
+ *
+ * @param address  the device's address of the register whose high byte is compared with the
+ *                 first byte
+ * @param bytes    the bytes
+ * @param length   how many bytes, two for each register; may be odd
+ * @param equal    receives 1 if all bytes are equal, otherwise 0. It is 1 for no bytes
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_isEqualBytes(const mbm_registers *registers, uint16_t address,
+                                   const uint8_t *bytes, uint16_t length, uint8_t *equal);
 
 /**
  * Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
@@ -409,6 +447,27 @@ uint8_t mbm_registers_getBytes(const mbm_registers *registers, uint16_t address,
  */
 uint8_t mbm_registers_setBit(const mbm_registers *registers, uint16_t address, uint8_t bit,
                              uint8_t on);
+
+/**
+ * Writes one byte of a register; the other byte does not change.
+ *
+ * @param registers  the registers, of a kind that may be written
+ * @param address    the device's address of the register
+ * @param high       0 for the low byte, anything else for the high byte, which is transmitted
+ *                   first. No order of `registers` exchanges them
+ * @param value      the byte, 0 to 255
+ * @return a status; see mbm_registers
+ */
+uint8_t mbm_registers_setUint8(const mbm_registers *registers, uint16_t address, uint8_t high,
+                               uint8_t value);
+
+/**
+ * As mbm_registers_setUint8, for a signed byte in two's complement.
+ *
+ * @param value  the byte, -128 to 127
+ */
+uint8_t mbm_registers_setInt8(const mbm_registers *registers, uint16_t address, uint8_t high,
+                              int8_t value);
 
 /**
  * Writes a number into one register. The order of words has no effect; the order of

@@ -115,6 +115,12 @@ impl<C: RegisterBytes> Registers<C> {
         })
     }
 
+    /// These registers, with another order for the calls that have no argument for it.
+    #[must_use]
+    pub fn with_byte_order(self, order: Order) -> Self {
+        Registers { order, ..self }
+    }
+
     /// The index of the high byte of the register `address`, if `length` bytes from there
     /// exist.
     pub(super) fn byte_index(&self, address: u16, length: usize) -> Result<usize, Error> {

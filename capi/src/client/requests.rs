@@ -346,6 +346,29 @@ functions! {
             FunctionSpec::WRITE_FILE_RECORD, [GROUP, file.into(), record.into(), quantity.into()],
             Some(add_group));
 
+    /// Function 14 with several groups: reads records of several files, or of several ranges.
+    /// `data` contains the groups as on the wire, seven bytes each, as mbm_packet_addRecord
+    /// builds them. `reply` receives the sub-responses as on the wire: of each group its length
+    /// after this byte, the reference type 6, and the words, the high byte first (V1.1b3, 6.14).
+    ///
+    /// @param bytes  the number of bytes of `data`, 7 to 245, a multiple of 7
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_readFileRecords(bytes: u16)
+        = with_more(
+            FunctionSpec::READ_FILE_RECORDS, [bytes.into(), 0, 0, 0],
+            Some(|fields, words, _| fields.state.read_file_records(words[0] as u16)));
+
+    /// Function 15 with several groups: writes records of several files, or of several ranges.
+    /// `data` contains the groups as on the wire, as mbm_packet_addRecord builds them (V1.1b3,
+    /// 6.15).
+    ///
+    /// @param bytes  the number of bytes of `data`, 9 to 251
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_writeFileRecords(bytes: u16)
+        = with_more(
+            FunctionSpec::WRITE_FILE_RECORDS, [bytes.into(), 0, 0, 0],
+            Some(|fields, words, _| fields.state.write_file_records(words[0] as u16)));
+
     /// Function 18: reads up to 31 registers of a FIFO queue into the words of `reply` (V1.1b3,
     /// 6.18).
     ///
@@ -365,6 +388,18 @@ functions! {
         = with_more(
             FunctionSpec::READ_DEVICE_IDENTIFICATION, identification(code, object),
             Some(|_, words, _| RequestState::check_code(words[2] as u8)));
+
+    /// Function 2B with any MEI type: sends the bytes of `data` after the MEI type, and reads the
+    /// bytes after the MEI type of the response into `reply` (V1.1b3, 6.19). On RTU, silence ends
+    /// the response.
+    ///
+    /// @param meiType  the MEI type, for example MBM_MEI_CANOPEN, 0 to 255
+    /// @param bytes    the number of bytes of `data`, 0 to 251
+    /// @return a status; see mbm_client_readCoils
+    fn mbm_client_encapsulatedInterfaceTransport(meiType: u8, bytes: u16)
+        = with_more(
+            FunctionSpec::ENCAPSULATED, [usize::from(meiType) << 8, bytes.into(), 0, 0],
+            Some(|fields, words, _| fields.state.follow(words[1] as u16)));
 }
 
 /// Any function code: sends the bytes of `data` after the function code, and reads the bytes

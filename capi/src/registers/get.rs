@@ -1,7 +1,7 @@
 //! Reads values from registers. A call that fails leaves the caller's value unchanged.
 
 use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
-use crate::pointers::{self, slice_mut};
+use crate::pointers::{self, slice, slice_mut};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
@@ -56,6 +56,35 @@ functions! {
     /// @return a status; see mbm_registers
     fn mbm_registers_getBit(address: u16, bit: u8, on: *mut u8)
         = get_value(MBM_ORDER_DEFAULT, on, |registers| registers.bit(address, bit).map(u8::from));
+
+    /// Reads one byte of a register, 0 to 255.
+    ///
+    /// @param address  the device's address of the register
+    /// @param high     0 for the low byte, anything else for the high byte, which is transmitted
+    ///                 first. No order of `registers` exchanges them
+    /// @param value    receives the byte
+    /// @return a status; see mbm_registers
+    fn mbm_registers_getUint8(address: u16, high: u8, value: *mut u8)
+        = get_value(MBM_ORDER_DEFAULT, value, |registers| registers.u8(address, high != 0));
+
+    /// As mbm_registers_getUint8, for a signed byte in two's complement, -128 to 127.
+    fn mbm_registers_getInt8(address: u16, high: u8, value: *mut i8)
+        = get_value(MBM_ORDER_DEFAULT, value, |registers| registers.i8(address, high != 0));
+
+    /// Compares registers with bytes, in the order of the wire: the high byte of each register
+    /// first, whatever the order of `registers`.
+    ///
+    /// @param address  the device's address of the register whose high byte is compared with the
+    ///                 first byte
+    /// @param bytes    the bytes
+    /// @param length   how many bytes, two for each register; may be odd
+    /// @param equal    receives 1 if all bytes are equal, otherwise 0. It is 1 for no bytes
+    /// @return a status; see mbm_registers
+    fn mbm_registers_isEqualBytes(address: u16, bytes: *const u8, length: u16, equal: *mut u8)
+        = get_value(MBM_ORDER_DEFAULT, equal, |registers| {
+            let is_equal = registers.is_equal(address, slice(bytes, length.into())?)?;
+            Ok(is_equal.into())
+        });
 
     /// Reads a number of one register, 0 to 65535. For a signed number, pass a pointer to an
     /// int16_t, cast to uint16_t *. The order of words has no effect; the order of bytes has.

@@ -252,4 +252,26 @@ functions! {
     /// @return a status; see mbm_registers_ofBytes
     fn mbm_registers_intoBytes(bytes: *mut u8, length: u16, first: u16)
         = fill(bytes.cast(), MBM_REGISTERS_INTO_BYTES, length, first);
+
+    /// Sets the order of the values that calls with MBM_ORDER_DEFAULT read and write.
+    ///
+    /// @param registers  the view, filled in
+    /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for MBM_ORDER_ABCD
+    fn mbm_registers_setByteOrder(order: u8) = set_order(order);
+}
+
+/// Sets the order of a view.
+///
+/// # Safety
+/// `registers` is NULL or points to an `mbm_registers`.
+unsafe fn set_order(registers: *mut mbm_registers, code: u8) -> u8 {
+    let status = match registers.as_mut() {
+        None => Status::INVALID_ARGUMENT,
+        Some(registers) if registers.data.is_null() => Status::NOT_INITIALISED,
+        Some(registers) => {
+            let known = order(code, Order::Abcd).map(|_| registers.order = code);
+            known.into()
+        }
+    };
+    status.code()
 }

@@ -54,6 +54,23 @@ functions! {
     fn mbm_registers_setBit(address: u16, bit: u8, on: u8)
         = with(MBM_ORDER_DEFAULT, |registers| registers.set_bit(address, bit, on != 0));
 
+    /// Writes one byte of a register; the other byte does not change.
+    ///
+    /// @param registers  the registers, of a kind that may be written
+    /// @param address    the device's address of the register
+    /// @param high       0 for the low byte, anything else for the high byte, which is transmitted
+    ///                   first. No order of `registers` exchanges them
+    /// @param value      the byte, 0 to 255
+    /// @return a status; see mbm_registers
+    fn mbm_registers_setUint8(address: u16, high: u8, value: u8)
+        = with(MBM_ORDER_DEFAULT, |registers| registers.set_u8(address, high != 0, value));
+
+    /// As mbm_registers_setUint8, for a signed byte in two's complement.
+    ///
+    /// @param value  the byte, -128 to 127
+    fn mbm_registers_setInt8(address: u16, high: u8, value: i8)
+        = with(MBM_ORDER_DEFAULT, |registers| registers.set_i8(address, high != 0, value));
+
     /// Writes a number into one register. The order of words has no effect; the order of
     /// bytes has.
     ///

@@ -50,7 +50,7 @@ fn fill(w: &World, request: *mut mbm_clientRequest, bytes: usize) {
 /// Queues a request of any function.
 pub fn request(w: &World, client: *mut mbm_client) {
     let request = w.requests.pick(w);
-    let choice = w.byte() % 26;
+    let choice = w.byte() % 29;
     let (a, b, c, d, byte) = (w.word(), w.word(), w.word(), w.word(), w.byte());
     // The length of `data` for this function, as the header says.
     let words = |count: u16| 2 * usize::from(count);
@@ -59,7 +59,8 @@ pub fn request(w: &World, client: *mut mbm_client) {
         11 | 21 => words(if choice == 11 { b } else { c }),
         13 => words(d),
         15 => words(b),
-        23 => b.into(),
+        23 | 24 => a.into(),
+        25 | 26 => b.into(),
         _ => 0,
     };
     let rule: *const mbm_rule = w.null_or(16, || w.put(rule(w))).cast_const();
@@ -111,7 +112,13 @@ pub fn request(w: &World, client: *mut mbm_client) {
                 mbm_client_readDeviceIdentification(client, request, code, object)
             )
         }
-        23 => call!(w, mbm_client_custom(client, request, byte, b, rule)),
+        23 => call!(w, mbm_client_readFileRecords(client, request, a)),
+        24 => call!(w, mbm_client_writeFileRecords(client, request, a)),
+        25 => call!(
+            w,
+            mbm_client_encapsulatedInterfaceTransport(client, request, byte, b)
+        ),
+        26 => call!(w, mbm_client_custom(client, request, byte, b, rule)),
         _ => call!(
             w,
             mbm_client_forward(client, request, function, body, length)

@@ -57,6 +57,14 @@ fn read(w: &World, view: *const mbm_registers) {
     let length = w.word();
     match w.byte() % 14 {
         0 => get!(mbm_registers_getBit, byte % 20),
+        1 => get!(mbm_registers_getUint8, byte),
+        2 => get!(mbm_registers_getInt8, byte),
+        4 => {
+            let with = w.null_or(32, || w.noise(length.into()));
+            get(w, "mbm_registers_isEqualBytes", |equal| {
+                call!(w, mbm_registers_isEqualBytes(view, at, with, length, equal))
+            });
+        }
         3 => get!(mbm_registers_getUint16, order),
         5 => get!(mbm_registers_getUint32, order),
         7 => get!(mbm_registers_getUint64, order),
@@ -126,7 +134,12 @@ fn write(w: &World, view: *const mbm_registers) {
     let choice = w.byte() % 14;
     refused_changes_nothing(w, &[memory_of(view)], "a setter", || match choice {
         0 => call!(w, mbm_registers_setBit(view, at, byte % 20, byte & 1)),
-        1..=3 => call!(w, mbm_registers_setUint16(view, at, order, word)),
+        1 => call!(w, mbm_registers_setUint8(view, at, byte & 1, byte)),
+        2 => call!(
+            w,
+            mbm_registers_setInt8(view, at, byte & 1, byte.cast_signed())
+        ),
+        3 => call!(w, mbm_registers_setUint16(view, at, order, word)),
         4 => call!(w, mbm_registers_setUint16(view, at, order, word)),
         5 => call!(w, mbm_registers_setUint32(view, at, order, long)),
         6 => call!(w, mbm_registers_setUint32(view, at, order, long)),
@@ -166,9 +179,13 @@ fn write(w: &World, view: *const mbm_registers) {
 /// Makes one call with a view.
 pub fn step(w: &World) {
     let view = w.views.pick(w);
-    match w.byte() % 4 {
-        0 => fill(w, view),
-        1 | 2 => read(w, view),
+    match w.byte() % 8 {
+        0 | 1 => fill(w, view),
+        2 => {
+            let order = w.byte() % 10;
+            refused!(w, &[span(view)], mbm_registers_setByteOrder(view, order));
+        }
+        3..=5 => read(w, view),
         _ => write(w, view),
     }
 }
