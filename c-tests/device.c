@@ -7,6 +7,7 @@
  *
  * HEADER is the header in quotes, UPPER and LOWER are the device's name in C. CONVERSIONS is
  * defined if the header has any, and REACH if the device needs something of a client and a link.
+ * MORE is a file in quotes with a function print_more, which takes the plan that has been read.
  *
  * Licence: MIT OR Apache-2.0. */
 #define JOIN(one, other) one##_##other
@@ -99,6 +100,10 @@ static void print_field(uint16_t field)
     }
 }
 
+#ifdef MORE
+#include MORE
+#endif
+
 /* Whether a plan with one read or one word of data less is refused, as it must be. */
 static int is_storage_exact(void)
 {
@@ -153,6 +158,9 @@ static int poll_device(const char *host, const char *service)
     }
     for (i = 0; i < FIELDS; i++)
         print_field(i);
+#ifdef MORE
+    print_more(&plan);
+#endif
     mbm_tcp_close(&tcp);
     return 0;
 }

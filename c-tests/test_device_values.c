@@ -94,6 +94,16 @@ TEST(numbers_that_mean_not_available_are_no_value)
     expect_none(FIELD("    type: float\n    not_available: -9999\n"), 0xC61C, 0x3C00);
 }
 
+TEST(of_a_number_of_24_bits_the_byte_above_does_not_count)
+{
+    expect_none(FIELD("    type: int24\n    not_available: -1\n"), 0x00FF, 0xFFFF);
+    expect_none(FIELD("    type: int24\n    not_available: -1\n"), 0x12FF, 0xFFFF);
+    expect_none(FIELD("    type: uint24\n    order: CDAB\n    not_available: 0xFFFFFF\n"), 0xFFFF,
+                0x12FF);
+    expect_shown(FIELD("    type: uint24\n    not_available: 0xFFFFFF\n"), "16777214", 0x12FF,
+                 0xFFFE);
+}
+
 TEST(a_float_that_is_not_a_number_is_not_available_without_any_key)
 {
     expect_none(FIELD("    type: float\n"), 0x7FC0, 0);

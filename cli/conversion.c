@@ -81,12 +81,21 @@ static int is_empty(uint8_t type, const mbm_registers *registers, uint16_t addre
     return 1;
 }
 
+/* Which bits of the nth register of a value count. */
+static uint16_t mask_of(const value_form *form, uint16_t nth)
+{
+    const int is_24 = form->type == VALUE_INT24 || form->type == VALUE_UINT24;
+
+    return is_24 ? value_mask(VALUE_BITS32, form->order, 0, 24, nth)
+                 : value_mask(form->type, form->order, form->first, form->bits, nth);
+}
+
 /* Whether the registers have a number, or a text, that means "not available". */
 static int is_listed(const value_form *form, const mbm_registers *registers, uint16_t address,
                      uint16_t count)
 {
     const conversion *of = conversion_of(form);
-    uint16_t words[VALUE_WORDS] = {0}, size, i;
+    uint16_t words[VALUE_WORDS] = {0}, size, i, at;
 
     if (value_is_text(form->type))
         return of->is_standard && is_empty(form->type, registers, address, count);
@@ -96,11 +105,14 @@ static int is_listed(const value_form *form, const mbm_registers *registers, uin
     for (i = 0; i < size && i < VALUE_WORDS; i++) {
         (void)mbm_registers_getUint16(registers, (uint16_t)(address + i), MBM_ORDER_ABCD,
                                       &words[i]);
-        words[i] &= value_mask(form->type, form->order, form->first, form->bits, i);
+        words[i] &= mask_of(form, i);
     }
-    for (i = 0; i < of->number_count; i++)
-        if (memcmp(words, of->numbers[i], size * sizeof *words) == 0)
+    for (at = 0; at < of->number_count; at++) {
+        for (i = 0; i < size && words[i] == (of->numbers[at][i] & mask_of(form, i));)
+            i++;
+        if (i == size)
             return 1;
+    }
     return of->is_standard && is_reserved(form, words, size * sizeof *words);
 }
 

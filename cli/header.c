@@ -450,8 +450,7 @@ static int write_header(job *j, header *h)
     if (!header_write_fields(h) || !header_write_plan(h))
         return 0;
     header_write_reach(h);
-    header_write_types(h);
-    if (!header_write_server(h))
+    if (!header_write_checks(h) || !header_write_types(h) || !header_write_server(h))
         return 0;
     fprintf(h->out, "\n#endif\n");
     return 1;

@@ -54,6 +54,9 @@ void header_comment(FILE *out, const char *text);
  */
 void header_place(const header *h, const mbm_planField *planned);
 
+/* Writes a whole number as a constant in C of a type that holds it everywhere. */
+void header_write_constant(FILE *out, const char *number);
+
 /* The C type of a field's value; that of a bit is uint8_t. */
 const char *header_type(const mbm_planField *planned);
 
@@ -75,8 +78,18 @@ void header_write_meaning(FILE *out, const device_field *field, const char *befo
 /* Writes the constants of a field's limits. Returns 0 after reporting a refusal. */
 int header_write_limit_constants(header *h, uint16_t at);
 
+/* Writes the functions that check whether a number is within the limits of a field; whether a field
+ * has such a function. Writing returns 0 after reporting a refusal. */
+int header_write_checks(const header *h);
+int header_is_checked(const header *h, uint16_t at);
+
 /* Writes the conversions of a plan's fields. Returns 0 after reporting a refusal. */
 int header_write_conversions(header *h);
+
+/* The offset of a field as a number of 32 bits and its decimals. Returns 0 after reporting that it
+ * does not fit. */
+int header_find_offset(const header *h, const device_field *field, int32_t *offset,
+                       unsigned *decimals);
 
 /* Write a part of the header. They return 0 after reporting a refusal. */
 int header_write_fields(header *h);
@@ -94,9 +107,10 @@ int header_has_reach(const header *h);
 /* Whether a field has functions of its own, because a plan does not know its type or order. */
 int header_is_special(const mbm_planField *planned);
 
-/* Writes the functions that take such fields out of registers and put them into them; and those of
- * a server, which get and set one in the array of its table, of the addresses `first` to `last`. */
-void header_write_types(const header *h);
+/* Writes the functions that take such fields out of registers and put them into them, and those
+ * that get their values of a plan, which returns 0 after reporting a refusal; and those of a
+ * server, which get and set one in the array of its table, of the addresses `first` to `last`. */
+int header_write_types(const header *h);
 void header_write_special(const header *h, uint16_t at, const char *name, const char *array,
                           uint32_t first, uint32_t last);
 

@@ -66,15 +66,17 @@ void header_write_meaning(FILE *out, const device_field *field, const char *befo
 
 /* --- constants --- */
 
-/* Finds the offset as a number of 32 bits and its decimals. Returns 0 after reporting that it does
- * not fit. */
-static int find_offset(const header *h, const device_field *field, int32_t *offset,
+int header_find_offset(const header *h, const device_field *field, int32_t *offset,
                        unsigned *decimals)
 {
-    const value_scale *of = &field->conversion->offset;
-    uint64_t amount = of->digits;
-    long exponent = of->exponent;
+    const value_scale *of = field->conversion ? &field->conversion->offset : NULL;
+    uint64_t amount = of ? of->digits : 0;
+    long exponent = of ? of->exponent : 0;
 
+    *offset = 0;
+    *decimals = 0;
+    if (amount == 0)
+        return 1;
     for (; exponent > 0 && amount <= INT32_MAX; exponent--)
         amount *= 10;
     if (amount > INT32_MAX || exponent < -9) {
@@ -137,10 +139,10 @@ static void write_flags(FILE *out, const device_field *field)
 static int write_constant(const header *h, uint16_t at, const char *lower)
 {
     const device_field *field = &h->of->fields[at];
-    unsigned decimals = 0, words;
-    int32_t offset = 0;
+    unsigned decimals, words;
+    int32_t offset;
 
-    if (has_offset(field) && !find_offset(h, field, &offset, &decimals))
+    if (!header_find_offset(h, field, &offset, &decimals))
         return 0;
     fputc('\n', h->out);
     words = write_numbers(h, at, lower);

@@ -6,6 +6,7 @@
 
 #include "decimal.h"
 #include "numbers.h"
+#include "report.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -58,7 +59,7 @@ static int find_raw(const header *h, uint16_t at, const value_scale *limit, int 
 
 /* Writes a limit of a float: the nearest one, in the fewest digits. */
 static void write_float(const header *h, uint16_t at, const char *suffix, const decimal_number *raw,
-                        int is_float)
+                        int is_short)
 {
     char text[DECIMAL_BYTES];
     int digits = 5;
@@ -69,66 +70,89 @@ static void write_float(const header *h, uint16_t at, const char *suffix, const 
     do
         snprintf(text, sizeof text, "%.*g", ++digits, value);
     while (digits < 17 &&
-           (is_float ? strtof(text, NULL) != (float)value : strtod(text, NULL) != value));
+           (is_short ? strtof(text, NULL) != (float)value : strtod(text, NULL) != value));
     fprintf(h->out, "#define %s_%s%s (%s%s%s)\n", h->upper, h->fields[at], suffix, text,
-            strpbrk(text, ".e") ? "" : ".0", is_float ? "f" : "");
+            strpbrk(text, ".e") ? "" : ".0", is_short ? "f" : "");
 }
 
-/* Writes a limit of an integer, in the C type that the field has or in a longer one. `round` is 1
- * for the next one above, -1 for the next one below. Returns 0 if there is none, and writes
- * nothing. */
-static int write_whole(const header *h, uint16_t at, const char *suffix, const whole *limit,
-                       int round, int is_signed)
+/* Whether the numbers of a field are floats, and whether they have a sign. */
+static int is_float(const header *h, uint16_t at)
 {
-    uint64_t amount = limit->amount;
-    int is_negative = limit->is_negative;
+    const char *type = header_number_type(&h->of->planned[at]);
+
+    return type[0] == 'f' || type[0] == 'd';
+}
+
+static int is_signed(const header *h, uint16_t at)
+{
+    return header_number_type(&h->of->planned[at])[0] == 'i';
+}
+
+/* Rounds a limit to a whole number that the C type of the field, or a longer one, has: the next one
+ * above if `round` is 1, the next one below if it is -1. Returns 0 if there is none. */
+static int round_whole(whole *limit, int round, int has_sign)
+{
+    if (limit->has_rest && limit->is_negative == (round < 0)) {
+        if (limit->amount == UINT64_MAX)
+            return 0;
+        limit->amount++;
+    }
+    if (limit->is_negative && !has_sign) {
+        if (round < 0 && limit->amount > 0)
+            return 0;
+        limit->amount = 0;
+    }
+    limit->is_negative = limit->is_negative && limit->amount > 0;
+    return !has_sign || limit->amount <= INT64_MAX;
+}
+
+/* Finds a limit as a whole number; `round` is 0 for the step. Returns 0 if there is none. */
+static int find_whole(const header *h, uint16_t at, const value_scale *limit, int round,
+                      whole *number)
+{
+    static decimal_number raw;
+
+    if (!find_raw(h, at, limit, round == 0, &raw) ||
+        !divide(&raw, h->scales[at].multiplier, number))
+        return 0;
+    if (round == 0)
+        number->is_negative = 0;
+    return (round != 0 || !number->has_rest) && round_whole(number, round, is_signed(h, at));
+}
+
+/* Writes a limit of an integer, in the C type that the field has or in a longer one. */
+static void write_whole(const header *h, uint16_t at, const char *suffix, const whole *limit)
+{
+    const uint64_t amount = limit->amount;
     const char *ending;
 
-    if (limit->has_rest && is_negative == (round < 0)) {
-        if (amount == UINT64_MAX)
-            return 0;
-        amount++;
-    }
-    if (is_negative && !is_signed) {
-        if (round < 0 && amount > 0)
-            return 0;
-        amount = 0;
-    }
-    is_negative = is_negative && amount > 0;
-    if (is_signed && amount > INT64_MAX)
-        return 0;
-    if (is_signed)
+    if (is_signed(h, at))
         ending = amount <= INT16_MAX ? "" : amount <= INT32_MAX ? "l" : "ll";
     else
         ending = amount <= UINT16_MAX ? "u" : amount <= UINT32_MAX ? "ul" : "ull";
     fprintf(h->out,
-            is_negative ? "#define %s_%s%s (-%" PRIu64 "%s)\n" : "#define %s_%s%s %" PRIu64 "%s\n",
+            limit->is_negative ? "#define %s_%s%s (-%" PRIu64 "%s)\n"
+                               : "#define %s_%s%s %" PRIu64 "%s\n",
             h->upper, h->fields[at], suffix, amount, ending);
-    return 1;
 }
 
 /* Writes a limit, if the registers can have it. Returns 0 after reporting a refusal. */
 static int write_limit(header *h, uint16_t at, const char *suffix, const value_scale *limit,
                        int round)
 {
-    const char *type = header_number_type(&h->of->planned[at]);
     static decimal_number raw;
     whole number;
 
-    if (!find_raw(h, at, limit, round == 0, &raw))
-        return 1;
-    if (strcmp(type, "float") == 0 || strcmp(type, "double") == 0) {
+    if (is_float(h, at)) {
+        if (!find_raw(h, at, limit, round == 0, &raw))
+            return 1;
         if (round == 0 && h->scales[at].multiplier < 0)
             raw.is_negative = 1;
-        write_float(h, at, suffix, &raw, type[0] == 'f');
+        write_float(h, at, suffix, &raw, header_number_type(&h->of->planned[at])[0] == 'f');
+    } else if (find_whole(h, at, limit, round, &number)) {
+        write_whole(h, at, suffix, &number);
     } else {
-        if (!divide(&raw, h->scales[at].multiplier, &number))
-            return 1;
-        if (round == 0)
-            number.is_negative = 0;
-        if ((round == 0 && number.has_rest) ||
-            !write_whole(h, at, suffix, &number, round, type[0] == 'i'))
-            return 1;
+        return 1;
     }
     return header_define(h, at, suffix, h->of->fields[at].line);
 }
@@ -138,7 +162,6 @@ static int has_base(const header *h, uint16_t at)
 {
     static const value_scale ZERO;
     const conversion *of = h->of->fields[at].conversion;
-    const char type = header_number_type(&h->of->planned[at])[0];
     static decimal_number raw;
     whole base;
 
@@ -147,8 +170,8 @@ static int has_base(const header *h, uint16_t at)
         return 0;
     if (!of->has_least)
         return base.amount == 0 && !base.has_rest;
-    return type == 'f' || type == 'd' ||
-           (!base.has_rest && (base.amount == 0 || !base.is_negative || type == 'i'));
+    return is_float(h, at) ||
+           (!base.has_rest && (base.amount == 0 || !base.is_negative || is_signed(h, at)));
 }
 
 int header_write_limit_constants(header *h, uint16_t at)
@@ -165,4 +188,175 @@ int header_write_limit_constants(header *h, uint16_t at)
            (!of->has_most ||
             write_limit(h, at, is_turned ? "_MIN" : "_MAX", &of->most, is_turned ? 1 : -1)) &&
            (!of->has_step || !has_base(h, at) || write_limit(h, at, "_STEP", &of->step, 0));
+}
+
+/* --- functions that check --- */
+
+/* The limits of a field as the registers have them: with a negative scale the maximum is that of
+ * min_value. */
+typedef struct limits {
+    const value_scale *least, *most;
+} limits;
+
+static limits limits_of(const header *h, uint16_t at)
+{
+    const conversion *of = h->of->fields[at].conversion;
+    const value_scale *least = of->has_least ? &of->least : NULL;
+    const value_scale *most = of->has_most ? &of->most : NULL;
+    const int is_turned = h->scales[at].multiplier < 0;
+
+    return is_turned ? (limits){most, least} : (limits){least, most};
+}
+
+/* Bits of the C type of a field. */
+static unsigned bits_of(const header *h, uint16_t at)
+{
+    const char *type = header_number_type(&h->of->planned[at]);
+
+    return (unsigned)strtoul(type + strcspn(type, "123456789"), NULL, 10);
+}
+
+/* Compares a limit with the range of the C type of the field: -1 if it is the least number or below
+ * it, 1 if it is the greatest or above it. `is_beyond`: it is not that number itself. */
+static int compare_with_type(const header *h, uint16_t at, const whole *limit, int *is_beyond)
+{
+    const int has_sign = is_signed(h, at);
+    const uint64_t most = UINT64_MAX >> (64 - bits_of(h, at) + (unsigned)has_sign);
+    const uint64_t below = has_sign ? most + 1 : 0;
+
+    *is_beyond = limit->amount > (limit->is_negative ? below : most);
+    if (limit->is_negative || (limit->amount == 0 && !has_sign))
+        return limit->amount >= below ? -1 : 0;
+    return limit->amount >= most ? 1 : 0;
+}
+
+/* What is to be compared: nothing, since each number is within the limit; the number; or nothing,
+ * since none is. */
+enum { ALL, SOME, NONE };
+
+/* `round` is 1 for the least number, -1 for the greatest. */
+static int what_a_limit_allows(const header *h, uint16_t at, const value_scale *limit, int round)
+{
+    static decimal_number raw;
+    int is_beyond, place;
+    whole number;
+
+    if (!limit)
+        return ALL;
+    if (is_float(h, at))
+        return find_raw(h, at, limit, 0, &raw) ? SOME : ALL;
+    if (!find_whole(h, at, limit, round, &number)) {
+        /* Beyond what has 64 bits, or negative where the field has no sign. */
+        if (!find_raw(h, at, limit, 0, &raw))
+            return ALL;
+        return (raw.is_negative != (h->scales[at].multiplier < 0)) == (round < 0) ? NONE : ALL;
+    }
+    place = compare_with_type(h, at, &number, &is_beyond);
+    if (place == -round)
+        return ALL;
+    return place == round && is_beyond ? NONE : SOME;
+}
+
+/* Whether the step of a field can be checked: that of a float is not exact in binary. */
+static int has_step(const header *h, uint16_t at)
+{
+    const conversion *of = h->of->fields[at].conversion;
+    whole step;
+
+    return of->has_step && !is_float(h, at) && has_base(h, at) &&
+           find_whole(h, at, &of->step, 0, &step);
+}
+
+/* Writes the condition that a number is a multiple of the step. */
+static void write_step(const header *h, uint16_t at, const limits *of)
+{
+    const conversion *own = h->of->fields[at].conversion;
+    const unsigned bits = bits_of(h, at);
+    const char *upper = h->upper, *name = h->fields[at];
+    unsigned wide = bits < 16 ? 16 : bits;
+    whole step;
+
+    (void)find_whole(h, at, &own->step, 0, &step);
+    if (!own->has_least) {
+        fprintf(h->out, "value %% %s_%s_STEP == 0", upper, name);
+        return;
+    }
+    /* Without a sign no difference overflows. */
+    while (wide < 64 && step.amount >> wide)
+        wide *= 2;
+    if (of->least == &own->least)
+        fprintf(h->out, "(uint%u_t)((uint%u_t)value - (uint%u_t)%s_%s_MIN)", wide, wide, wide,
+                upper, name);
+    else
+        fprintf(h->out, "(uint%u_t)((uint%u_t)%s_%s_MAX - (uint%u_t)value)", wide, wide, upper,
+                name, wide);
+    fprintf(h->out, " %% (uint%u_t)%s_%s_STEP == 0", wide, upper, name);
+}
+
+int header_is_checked(const header *h, uint16_t at)
+{
+    const device_field *field = &h->of->fields[at];
+
+    return conversion_has_limits(field->conversion) && !field->power_name;
+}
+
+/* Writes the function that checks a number. */
+static void write_check(const header *h, uint16_t at, const char *name)
+{
+    const limits of = limits_of(h, at);
+    const int least = what_a_limit_allows(h, at, of.least, 1);
+    const int most = what_a_limit_allows(h, at, of.most, -1);
+    const char *and = "";
+
+    fprintf(h->out, "\nstatic inline uint8_t %s_check_%s(%s value)\n{\n", h->lower, name,
+            header_number_type(&h->of->planned[at]));
+    if (least == NONE || most == NONE || (least == ALL && most == ALL && !has_step(h, at))) {
+        fprintf(h->out, "    (void)value;\n    return %s;\n}\n",
+                least == NONE || most == NONE ? "MBM_OUT_OF_RANGE" : "MBM_OK");
+        return;
+    }
+    fprintf(h->out, "    return ");
+    if (least == SOME) {
+        fprintf(h->out, "value >= %s_%s_MIN", h->upper, h->fields[at]);
+        and = " && ";
+    }
+    if (most == SOME) {
+        fprintf(h->out, "%svalue <= %s_%s_MAX", and, h->upper, h->fields[at]);
+        and = " && ";
+    }
+    if (has_step(h, at)) {
+        fputs(and, h->out);
+        write_step(h, at, &of);
+    }
+    fprintf(h->out, " ? MBM_OK : MBM_OUT_OF_RANGE;\n}\n");
+}
+
+int header_write_checks(const header *h)
+{
+    int is_first = 1;
+    uint16_t i;
+
+    for (i = 0; i < h->of->count; i++) {
+        char *name;
+
+        if (!header_is_checked(h, i))
+            continue;
+        if (is_first)
+            fprintf(h->out,
+                    "\n/* ==== Limits: whether a number, as the registers have it, may be written: "
+                    "MBM_OK, or\n * MBM_OUT_OF_RANGE. ==== */\n\n"
+                    "#if defined(%s_PLAN) || defined(%s_SERVER)\n#include \"mbm.h\"\n",
+                    h->upper, h->upper);
+        is_first = 0;
+        name = header_lower(h->fields[i]);
+        if (!name) {
+            (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
+            return 0;
+        }
+        write_check(h, i, name);
+        free(name);
+    }
+    if (!is_first)
+        fprintf(h->out, "#endif\n");
+    return 1;
 }

@@ -64,8 +64,7 @@ const char *header_type(const mbm_planField *planned)
 
 /* --- fields --- */
 
-/* Writes a whole number as a constant in C of a type that holds it everywhere. */
-static void write_constant(FILE *out, const char *number)
+void header_write_constant(FILE *out, const char *number)
 {
     const int is_negative = number[0] == '-';
     const uint64_t amount = strtoull(number + is_negative, NULL, 10);
@@ -137,7 +136,7 @@ static int write_labels(header *h, uint16_t at)
             if (is_small)
                 fprintf(h->out, "%s%s", label->number, i + 1 < field->label_count ? "," : "");
             else
-                write_constant(h->out, label->number);
+                header_write_constant(h->out, label->number);
             fprintf(h->out, " /* ");
             header_comment(h->out, label->name);
             fprintf(h->out, " */\n");
