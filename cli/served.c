@@ -50,30 +50,37 @@ static uint16_t vary(served_cells *cells, uint16_t address, int is_bit)
 
 /* --- the cells of a table --- */
 
-static uint16_t get(void *context, uint16_t address)
+/* The cells that a request is for: unit 0 gets the requests to every unit. */
+static served_cells *asked(void *context)
 {
     served_cells *cells = (served_cells *)context;
+    const served_units *units = cells->owner;
 
-    return cells->values[address];
+    return cells->unit > 0 ? cells : &units->cells[units->asked][cells->table - 1];
+}
+
+static uint16_t get(void *context, uint16_t address)
+{
+    return asked(context)->values[address];
 }
 
 static uint16_t get_random_register(void *context, uint16_t address)
 {
-    served_cells *cells = (served_cells *)context;
+    served_cells *cells = asked(context);
 
     return has(cells->written, address) ? cells->values[address] : vary(cells, address, 0);
 }
 
 static uint16_t get_random_bit(void *context, uint16_t address)
 {
-    served_cells *cells = (served_cells *)context;
+    served_cells *cells = asked(context);
 
     return has(cells->written, address) ? cells->values[address] : vary(cells, address, 1) & 1;
 }
 
 static void set(void *context, uint16_t address, uint16_t value)
 {
-    served_cells *cells = (served_cells *)context;
+    served_cells *cells = asked(context);
 
     cells->values[address] = value;
     if (cells->written)
@@ -82,7 +89,7 @@ static void set(void *context, uint16_t address, uint16_t value)
 
 static uint8_t exists(void *context, uint16_t address)
 {
-    const served_cells *cells = (const served_cells *)context;
+    const served_cells *cells = asked(context);
 
     return (uint8_t)(has(cells->readable, address) || has(cells->writable, address));
 }
@@ -100,7 +107,7 @@ static uint8_t check(const uint8_t *bitmap, const mbm_access *access)
 
 static uint8_t before_read(void *context, const mbm_access *access)
 {
-    const served_cells *cells = (const served_cells *)context;
+    const served_cells *cells = asked(context);
 
     if (cells->most_read > 0 && access->quantity > cells->most_read)
         return MBM_ILLEGAL_DATA_VALUE;
@@ -125,7 +132,7 @@ static int has_function(const served_cells *cells, const mbm_access *access)
 
 static uint8_t before_write(void *context, const mbm_access *access)
 {
-    const served_cells *cells = (const served_cells *)context;
+    const served_cells *cells = asked(context);
     uint8_t exception;
 
     if (!has_function(cells, access))
@@ -178,9 +185,14 @@ static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum ser
 static uint16_t see_request(void *context, const mbm_request *request, uint8_t *response,
                             uint16_t capacity)
 {
-    const served_hook *hook = (const served_hook *)context;
-    const uint8_t exception = hook->before(hook->context, request);
+    served_units *units = (served_units *)context;
+    const uint8_t exception = units->hook->before(units->hook->context, request);
+    uint8_t i;
 
+    units->asked = 0;
+    for (i = 1; i < units->count; i++)
+        if (units->units[i].id == request->unit)
+            units->asked = i;
     (void)response;
     (void)capacity;
     return exception ? MBM_REPLY_EXCEPTION | exception : MBM_REPLY_DECLINED;
@@ -207,7 +219,8 @@ static int begin(served_units *units, enum served_kind kind, const uint8_t *ids,
     if (!units->units || !units->cells)
         return -1;
     units->every_request.serve = see_request;
-    units->every_request.context = hook;
+    units->every_request.context = units;
+    units->hook = hook;
     identify(units, 0, "mbm");
     identify(units, 1, name ? name : "mbm serve");
     identify(units, 2, mbm_version());

@@ -39,6 +39,8 @@ typedef struct served_units {
     served_cells (*cells)[4]; /* the tables of each unit */
     const device *from;       /* NULL unless the units are those of a device */
     mbm_custom every_request;
+    served_hook *hook;
+    uint8_t asked; /* the place of the unit that the request names, 0 if it names none of them */
     mbm_serverIdentification identification;
     mbm_object objects[3];
 } served_units;

@@ -296,8 +296,25 @@ def test_unit_0_has_the_manners_of_other_units(mbm, playing, line):
     assert "exception 02" in mbm("read", place, 100, *reach).error
     assert "exception 02" in mbm("call", place, "03 00 00 00 51", *reach).error
     assert "exception 01" in mbm("write", place, 0, 5, *reach).error
-    # Unit 7 has the same manners, and the same registers.
-    assert mbm("read", place, 0, 2, *reach[:-1], 7).out == "    0  40\n    1  50\n"
+    # Unit 7 has the same manners, and registers of its own.
+    assert mbm("read", place, 0, 2, *reach[:-1], 7).out == "    0  0\n    1  0\n"
+    assert "exception 02" in mbm("read", place, 100, *reach[:-1], 7).error
+
+
+def test_a_device_file_with_unit_0_has_other_units_too(mbm, write):
+    place = mbm.serve("tcp://127.0.0.1:0", write("d.yaml", """\
+unit: 0
+fields:
+- {name: a, table: holding, address: 0, type: uint16, value: 5}
+- {name: b, table: holding, address: 9, type: uint16, unit: 23, value: 6, access: read-write}
+"""))
+    mbm.prints("    0  5\n", "read", place, "--unit", 0, 0)
+    mbm.prints("    9  6\n", "read", place, "--unit", 23, 9)
+    mbm.prints("unit 23: wrote 1 holding register from address 9 on, function 06\n", "write", place, "--unit", 23, 9, 7)
+    mbm.prints("    9  7\n", "read", place, "--unit", 23, 9)
+    mbm.fails(EXCEPTION, "exception 02", "read", place, "--unit", 23, 0, *PATIENT)
+    # Unit 0 answers for every other one.
+    mbm.prints("    0  5\n", "read", place, "--unit", 24, 0)
 
 
 def test_requests_to_unit_0_count_for_faults_and_are_answered(client):
