@@ -5,7 +5,7 @@ import json
 
 import peers
 import pytest
-from peers import DONE, EXCEPTION, PATIENT, TcpDevice, bit, number, pymodbus, served, ten_registers, wait, word
+from peers import DONE, EXCEPTION, PATIENT, TcpDevice, number, pymodbus, served, ten_registers, wait
 from pymodbus.server import ModbusTcpServer
 from services import Broker, Subscriber
 
@@ -31,32 +31,6 @@ def poll(mbm, write):
 
 # --- addresses ---
 
-def test_addresses_of_each_notation_are_those_that_the_device_has(poll, server):
-    wanted = {"level": word(100), "inverse": word(8) ^ 0xFFFF, "relay": bool(bit(30)), "state": not bit(30)}
-    modicon = "notation: modicon\nunit: 17\nfields:\n"
-    assert poll(server, modicon + """\
-- {name: level, address: 40101, type: uint16}
-- {name: inverse, address: 30009, type: uint16}
-- {name: relay, address: 31}
-- {name: state, address: 10031}
-""")[0] == wanted
-    assert poll(server, modicon + """\
-- {name: level, address: 400101, type: uint16}
-- {name: inverse, address: IR9, table: input, type: uint16}
-- {name: relay, address: "000031"}
-- {name: state, address: di31}
-""")[0] == wanted
-    assert poll(server, """\
-one_based: true
-unit: 17
-fields:
-- {name: level, table: holding, address: 101, type: uint16}
-- {name: inverse, table: input, address: 9, type: uint16}
-- {name: relay, table: coils, address: 31}
-- {name: state, table: discrete, address: 31}
-""")[0] == wanted
-
-
 def test_a_plan_is_shown_with_the_addresses_of_the_file(poll, server):
     _, said = poll(server, "notation: modicon\nunit: 17\nfields: [{name: level, address: 40101, type: uint16}]\n", "--show-plan")
     assert said == "request 1: unit 17, holding, 1 from 40101 on, every 1s\n"
@@ -75,19 +49,6 @@ fields:
   - {name: relay, table: coils, address: 11}
 - {name: last, table: holding, address: 2, type: uint16, repeat: {count: 3, every: 1, first: 0}}
 """
-CHANNEL_VALUES = {**{f"channel {n + 1} level": word(10 + 40 * n) for n in range(5)}, **{f"relay {n + 1}": bool(bit(11 + 40 * n)) for n in range(5)},
-                  **{f"last {n}": word(2 + n) for n in range(3)}}
-
-
-def test_repeated_fields_are_read_each_at_its_address(poll, server):
-    assert poll(server, CHANNELS)[0] == CHANNEL_VALUES
-
-
-def test_mbm_serve_is_a_device_with_repeated_fields(mbm, poll, write):
-    text = CHANNELS.replace("address: 10,", "address: 10, value: 7,")
-    place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", text))
-    values, _ = poll(place, text)
-    assert [values[f"channel {n} level"] for n in range(1, 6)] == [7] * 5
 
 
 def test_a_header_has_repeated_fields_with_their_numbers(plain, write):
@@ -101,30 +62,18 @@ LIMITED = """\
 max_read_registers: 10
 max_read_bits: 20
 excluded: [holding: 25-26]
-gap: {{registers: 3, bits: 30}}
-unit: 17
+gap: {registers: 3, bits: 30}
 fields:
-- {{name: levels, table: holding, address: 0, type: uint16, repeat: {{count: 25, every: 1}}}}
-- {{name: after, table: holding, address: 27, type: uint16}}
-- {{name: near, table: holding, address: 31, type: uint16}}
-- {{name: relay, table: coils, address: 100, repeat: {{count: 3, every: 19}}}}
-{more}"""
+- {name: levels, table: holding, address: 0, type: uint16, repeat: {count: 25, every: 1}}
+- {name: after, table: holding, address: 27, type: uint16}
+- {name: near, table: holding, address: 31, type: uint16}
+- {name: relay, table: coils, address: 100, repeat: {count: 3, every: 19}}
+"""
 
 
 def reads(said):
     """The requests of a plan: table, quantity and first address."""
     return [(words[4].rstrip(","), int(words[5]), int(words[7])) for words in (line.split() for line in said.splitlines())]
-
-
-def test_requests_keep_within_the_limits_of_the_file(poll, server):
-    values, said = poll(server, LIMITED.format(more=""), "--show-plan")
-    assert values == {**{f"levels {n + 1}": word(n) for n in range(25)}, "after": word(27), "near": word(31),
-                      **{f"relay {n + 1}": bool(bit(100 + 19 * n)) for n in range(3)}}
-    shown = reads(said)
-    for table, quantity, first in shown:
-        assert quantity <= (10 if table == "holding" else 20)
-        assert table == "coils" or first + quantity <= 25 or first > 26
-    assert len(shown) == 6
 
 
 def test_the_gap_of_the_command_line_wins(poll, server):
@@ -135,7 +84,7 @@ def test_the_gap_of_the_command_line_wins(poll, server):
 
 
 def test_mbm_header_groups_within_the_limits_of_the_file(plain, write):
-    header = plain("header", write("device.yaml", LIMITED.format(more=""))).out
+    header = plain("header", write("device.yaml", LIMITED)).out
     assert "#define DEVICE_READS 6\n" in header.replace("u\n", "\n")
 
 

@@ -79,12 +79,6 @@ def values(found):
 
 # --- reading ---
 
-def test_values_have_their_scale_offset_and_precision(device, poll):
-    found = poll(device)
-    assert values(found) == VALUES
-    assert {one["status"] for one in found.values()} == {"success"}
-
-
 def test_a_number_that_means_not_available_is_null_with_a_status_of_its_own(device, poll):
     device.set(2, 0xFFFF, 0x7FFF, 0xFFFF, 0x7FC0, 0)
     device.set(8, 0x8000, 0x8000, 0x8000, 0, 0)

@@ -1,5 +1,5 @@
-"""Values of the types that devices have beside integers and floats: written and read, byte by byte, and through `mbm serve`,
-a server of libmodbus, one of pymodbus and a bridge."""
+"""Values of the types that devices have beside integers and floats: written and read byte by byte, and through a bridge.
+test_device_keys.py has them on servers of others too."""
 
 import datetime
 import json
@@ -7,7 +7,7 @@ import struct
 
 import peers
 import pytest
-from peers import DAMAGED, DONE, PATIENT, WRONG, TcpDevice, served, wait
+from peers import DAMAGED, DONE, PATIENT, WRONG, TcpDevice, wait
 from services import Broker, Subscriber
 
 
@@ -130,70 +130,12 @@ def test_several_values_of_a_type_follow_each_other(mbm):
 # --- in a device file
 
 
-def fields_of(types):
-    """A device file with a field for each type, at the holding registers from 0 on, eight apart."""
-    lines = []
-    for at, (options, value, _) in enumerate(types):
-        more = dict(zip((one.lstrip("-").replace("time-zone", "time_zone") for one in options[1::2]), options[2::2]))
-        order = more.pop("o", None)
-        keys = {"name": f"f{at}", "table": "holding", "address": 8 * at, "type": options[0], "access": "read-write", **more}
-        if order:
-            keys["order"] = order
-        if options[0].startswith("text"):
-            keys["count"] = len(value)
-        lines.append("  - " + json.dumps(keys | {"value": value if is_text(value) else json.loads(value)}))
-    return "device: types\nunit: 17\nfields:\n" + "\n".join(lines) + "\n"
-
-
-def registers_of(types):
-    """The registers of such a device."""
-    held = [0] * (8 * len(types))
-    for at, (_, _, text) in enumerate(types):
-        for i in range(len(text) // 4):
-            held[8 * at + i] = int(text[4 * i:4 * i + 4], 16)
-    return held
-
-
 def poll(mbm, line, file):
     """The values of one round, and the statuses."""
     found = mbm("poll", line, file, "--once", "--json", "-q", *PATIENT)
     assert found.code == DONE, found
     rows = [json.loads(row) for row in found.out.splitlines()]
     return {row["name"]: row["value"] for row in rows}, {row["status"] for row in rows}
-
-
-def expected(types):
-    return {f"f{at}": value if is_text(value) else json.loads(value) for at, (_, value, _) in enumerate(types)}
-
-
-def test_mbm_serve_has_the_values_of_the_file_and_takes_others(mbm, write):
-    file = write("types.yaml", fields_of(TYPES))
-    line = mbm.serve("tcp://127.0.0.1:0", file)
-    assert poll(mbm, line, file) == (expected(TYPES), {"success"})
-    # What another program reads are these registers.
-    found = mbm.json("read", line, "-u", 17, 8 * 8, 2, "--hex")["values"]
-    assert [one["value"] for one in found] == ["0x1234", "0x5678"]
-
-
-def test_values_go_through_a_server_of_libmodbus(plain, libmodbus, write):
-    types = TYPES[:50]
-    file = write("types.yaml", fields_of(types))
-    for at, (options, value, _) in enumerate(types):
-        plain.prints("", "write", libmodbus.tcp, "-u", 17, "-q", "--multiple", "-T", *options, 8 * at, value)
-    assert poll(plain, libmodbus.tcp, file) == (expected(types), {"success"})
-
-
-def test_values_go_through_a_server_of_pymodbus(plain, write):
-    from pymodbus.server import ModbusTcpServer
-    from pymodbus.simulator import DataType, SimData, SimDevice
-
-    device = SimDevice(17, simdata=[SimData(0, values=registers_of(TYPES), datatype=DataType.REGISTERS)])
-    line = f"tcp://127.0.0.1:{served(lambda: ModbusTcpServer(device, address=('127.0.0.1', 0)))}"
-    file = write("types.yaml", fields_of(TYPES))
-    assert poll(plain, line, file) == (expected(TYPES), {"success"})
-    for options, value, address in ((["bcd32"], "87654321", 64), (["date", "--layout", "Y M D h m s"], "2000-02-29T12:00:00Z", 8 * 43)):
-        plain.prints("", "write", line, "-u", 17, "-q", "--multiple", "-T", *options, address, value)
-        plain.prints(f"{address:5}  {value}\n", "read", line, "-u", 17, "-T", *options, address)
 
 
 def test_pymodbus_reads_a_number_as_it_was_written_in_each_order(plain):
@@ -318,4 +260,3 @@ def test_a_library_of_others_packs_the_same_halves(plain):
         line = TcpDevice(lambda pdu: bytes([pdu[0], 2]) + data).line
         text = plain("read", line, "-T", "float16", 0, *PATIENT).out.split()[1]
         assert struct.pack(">e", float(text)) == data, (text, value)
-    assert peers.DONE == DONE
