@@ -116,12 +116,12 @@ impl<'a> Writer<'a> {
     /// Returns the number of bytes written.
     ///
     /// # Errors
-    /// [`Error::BUFFER_TOO_SMALL`] if they did not all fit.
+    /// [`Error::BufferTooSmall`] if they did not all fit.
     pub fn finish(self) -> Result<usize, Error> {
         if self.length <= self.bytes.len() {
             Ok(self.length)
         } else {
-            Err(Error::BUFFER_TOO_SMALL)
+            Err(Error::BufferTooSmall)
         }
     }
 }
@@ -156,7 +156,7 @@ mod tests {
         writer.u16(0x0A0B);
         writer.u16(0x0C0D);
         writer.u8(9);
-        assert_eq!(writer.finish(), Err(Error::BUFFER_TOO_SMALL));
+        assert_eq!(writer.finish(), Err(Error::BufferTooSmall));
         assert_eq!(bytes, [0x0A, 0x0B, 3]);
     }
 }

@@ -236,4 +236,4 @@ pub mod master;
 pub mod plan;
 pub mod server;
 
-pub use error::{Error, Status};
+pub use error::{Error, Exception, Status};

@@ -193,7 +193,7 @@ fn an_exception_is_the_error() {
     let mut master = master(&bench);
     let mut words = [1; 2];
     let result = bench.run(master.read_holding_registers(109, &mut words));
-    assert_eq!(result, Err(Error::ILLEGAL_DATA_ADDRESS));
+    assert_eq!(result, Err(Error::IllegalDataAddress));
     assert_eq!(master.exception_code(), 2);
     assert_eq!(words, [1; 2]);
 }
@@ -206,7 +206,7 @@ fn a_device_that_receives_nothing_times_out_and_is_asked_again() {
     master.settings().retries = 2;
     let begun = bench.wire.borrow().now;
     let result = bench.run(master.write_single_register(100, 1));
-    assert_eq!(result, Err(Error::RESPONSE_TIMED_OUT));
+    assert_eq!(result, Err(Error::ResponseTimedOut));
     let passed = bench.wire.borrow().now - begun;
     assert!((300_000..800_000).contains(&passed), "{passed}");
     assert_eq!(master.storage().counters[Counter::Requests as usize], 3);
@@ -250,7 +250,7 @@ fn a_broadcast_needs_no_reply() {
     assert_eq!(bench.run(master.write_single_register(100, 3)), Ok(()));
     assert_eq!(bench.device.holding[0], 3);
     let result = bench.run(master.read_coils(100, &mut [false]));
-    assert_eq!(result, Err(Error::BROADCAST_NOT_ALLOWED));
+    assert_eq!(result, Err(Error::BroadcastNotAllowed));
 }
 
 #[test]
@@ -258,13 +258,13 @@ fn a_request_that_the_standard_or_the_buffers_do_not_allow_is_refused() {
     let mut bench = Bench::new();
     let mut master = master(&bench);
     let refused = bench.run(master.read_holding_registers(0, &mut []));
-    assert_eq!(refused, Err(Error::ILLEGAL_DATA_VALUE));
+    assert_eq!(refused, Err(Error::InvalidQuantity));
     let refused = bench.run(master.read_holding_registers(0, &mut [0; 126]));
-    assert_eq!(refused, Err(Error::ILLEGAL_DATA_VALUE));
+    assert_eq!(refused, Err(Error::InvalidQuantity));
     let refused = bench.run(master.write_multiple_registers(0, &[0; 70_000]));
-    assert_eq!(refused, Err(Error::ILLEGAL_DATA_VALUE));
+    assert_eq!(refused, Err(Error::InvalidQuantity));
     let refused = bench.run(master.read_input_registers(0xFFFF, &mut [0; 2]));
-    assert_eq!(refused, Err(Error::ILLEGAL_DATA_ADDRESS));
+    assert_eq!(refused, Err(Error::InvalidAddress));
     assert!(bench.wire.borrow().sent.is_empty());
 }
 
@@ -283,7 +283,7 @@ fn a_uart_that_takes_no_byte_ends_the_request_as_a_busy_line() {
     bench.wire.borrow_mut().accepts = 0;
     let mut master = master(&bench);
     let result = bench.run(master.write_single_register(100, 1));
-    assert_eq!(result, Err(Error::LINE_BUSY));
+    assert_eq!(result, Err(Error::LineBusy));
     assert!(!bench.wire.borrow().driver);
     bench.wire.borrow_mut().accepts = 8;
     assert_eq!(bench.run(master.write_single_register(100, 1)), Ok(()));
@@ -295,7 +295,7 @@ fn a_write_that_fails_is_a_lost_link_and_the_next_request_tries_again() {
     bench.wire.borrow_mut().write_fails = true;
     let mut master = master(&bench);
     let result = bench.run(master.write_single_register(100, 1));
-    assert_eq!(result, Err(Error::LINK_LOST));
+    assert_eq!(result, Err(Error::LinkLost));
     bench.wire.borrow_mut().write_fails = false;
     assert_eq!(bench.run(master.write_single_register(100, 1)), Ok(()));
 }
@@ -306,7 +306,7 @@ fn the_end_of_what_can_be_read_is_a_lost_link() {
     bench.wire.borrow_mut().is_closed = true;
     let mut master = master(&bench);
     let result = bench.run(master.write_single_register(100, 1));
-    assert_eq!(result, Err(Error::LINK_LOST));
+    assert_eq!(result, Err(Error::LinkLost));
 }
 
 #[test]
@@ -331,7 +331,7 @@ fn a_uart_whose_reads_always_fail_does_not_keep_other_tasks_from_running() {
         bench.wire.borrow_mut().receive(&mut [0; 256]);
         bench.pass();
     };
-    assert_eq!(result, Err(Error::RESPONSE_TIMED_OUT));
+    assert_eq!(result, Err(Error::ResponseTimedOut));
 }
 
 #[test]
@@ -558,6 +558,6 @@ fn a_write_of_no_byte_and_a_flush_that_fails_are_a_lost_link() {
         let buffers = Buffers::new([0; 64], [0; 2], [0; 2]);
         let mut master = AsyncMaster::new(17, Ended { uart, writes }, clock, delay, buffers);
         let write = master.write_single_register(100, 1);
-        assert_eq!(bench.run(write), Err(Error::LINK_LOST), "{writes}");
+        assert_eq!(bench.run(write), Err(Error::LinkLost), "{writes}");
     }
 }

@@ -151,11 +151,11 @@ fn a_request_that_failed_has_read_nothing() {
     let mut client = client(&bench);
     let read = Request::read_holding_registers(17, 109, &mut words).unwrap();
     let read = run(&mut bench, &mut client, read);
-    assert_eq!(read.result(), Err(Error::ILLEGAL_DATA_ADDRESS));
+    assert_eq!(read.result(), Err(Error::IllegalDataAddress));
     assert!(read.registers().is_empty());
     let read = Request::read_coils(17, 119, &mut coils).unwrap();
     let read = run(&mut bench, &mut client, read);
-    assert_eq!(read.result(), Err(Error::ILLEGAL_DATA_ADDRESS));
+    assert_eq!(read.result(), Err(Error::IllegalDataAddress));
     assert!(read.coils().is_empty());
 }
 
@@ -176,16 +176,16 @@ fn a_function_without_a_constructor_takes_and_returns_bytes() {
     );
     assert_eq!(ended.bytes(), [0xA5, 0x37]);
     let refused = Request::of_bytes(17, query, &mut data[..1], &mut []).err();
-    assert_eq!(refused, Some(Error::INVALID_ARGUMENT));
+    assert_eq!(refused, Some(Error::InvalidArgument));
     let beyond = |state: &mut RequestState| state.set(FunctionSpec::READ_COILS, 0xFFFF, 2);
     let refused = Request::of_bytes(17, beyond, &mut [], &mut []).err();
-    assert_eq!(refused, Some(Error::ILLEGAL_DATA_ADDRESS));
+    assert_eq!(refused, Some(Error::InvalidAddress));
 }
 
 #[test]
 fn quantities_and_addresses_outside_the_standard_are_refused() {
-    let value = Some(Error::ILLEGAL_DATA_VALUE);
-    let address = Some(Error::ILLEGAL_DATA_ADDRESS);
+    let value = Some(Error::InvalidQuantity);
+    let address = Some(Error::InvalidAddress);
     let (mut words, mut bits) = (vec![0; 70_000], vec![false; 70_000]);
     for length in [0, 126, 70_000] {
         let words = &mut words[..length];
@@ -219,10 +219,10 @@ fn a_request_that_does_not_fit_into_the_queue_comes_back() {
     }
     let write = Request::write_single_register(17, 4, 1).unwrap();
     let refused = client.queue(write).unwrap_err();
-    assert_eq!(format!("{refused:?}"), "Refused(QUEUE_FULL)");
+    assert_eq!(format!("{refused:?}"), "Refused(QueueFull)");
     assert_eq!(refused.to_string(), "the queue is full");
-    assert_eq!(refused.error(), Error::QUEUE_FULL);
-    assert_eq!(refused.0.result(), Err(Error::QUEUE_FULL));
+    assert_eq!(refused.error(), Error::QueueFull);
+    assert_eq!(refused.0.result(), Err(Error::QueueFull));
 }
 
 #[test]
@@ -239,8 +239,8 @@ fn the_question_mark_passes_on_why_a_request_is_refused() {
     }
     let bench = Bench::new();
     let mut client = client(&bench);
-    assert_eq!(no_coils(&mut client), Err(Error::ILLEGAL_DATA_VALUE));
-    assert_eq!(long_timeout(&mut client), Err(Error::INVALID_ARGUMENT));
+    assert_eq!(no_coils(&mut client), Err(Error::InvalidQuantity));
+    assert_eq!(long_timeout(&mut client), Err(Error::InvalidArgument));
     assert_eq!(client.pending(), 0);
 }
 

@@ -26,7 +26,7 @@ fn all_requests_are_in_flight_at_once_and_answered_in_any_order() {
     }
     assert_eq!(
         client.queue(read(1, 17)).unwrap_err().error(),
-        Error::QUEUE_FULL
+        Error::QueueFull
     );
     assert!(poll(&end, &mut client).is_empty());
     let sent = requests(&end.sent());
@@ -180,7 +180,7 @@ fn two_pending_requests_cannot_have_the_same_number() {
     let (end, mut client) = client();
     assert!(client.queue(read(1, 7)).is_ok());
     let refused = client.queue(read(2, 7)).unwrap_err();
-    assert_eq!(refused.error(), Error::DUPLICATE_TRANSACTION);
+    assert_eq!(refused.error(), Error::DuplicateTransaction);
     assert_eq!(refused.0.state.status, Status::DUPLICATE_TRANSACTION);
     assert!(client.queue(read(1, 0)).is_ok());
     assert!(client.queue(read(1, 0)).is_ok());

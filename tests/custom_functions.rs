@@ -79,8 +79,8 @@ fn declared_functions_outside_the_user_defined_ranges_are_read_too() {
     assert_eq!(parse(&COUNTED), Ok(Request::Custom { function, data }));
     let response = Response::Custom { function, data };
     assert_eq!(parse_response(&COUNTED), Ok(response));
-    assert_eq!(Request::parse(&COUNTED), Err(Error::ILLEGAL_FUNCTION));
-    assert_eq!(Response::parse(&COUNTED), Err(Error::INVALID_FUNCTION));
+    assert_eq!(Request::parse(&COUNTED), Err(Error::IllegalFunction));
+    assert_eq!(Response::parse(&COUNTED), Err(Error::InvalidFunction));
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn a_length_that_breaks_its_rule_is_refused() {
         let longer = [pdu, &[0]].concat();
         let wrong = (1..pdu.len()).map(|end| &pdu[..end]).chain([&longer[..]]);
         for wrong in wrong {
-            assert_eq!(parse(wrong), Err(Error::ILLEGAL_DATA_VALUE));
-            assert_eq!(parse_response(wrong), Err(Error::MALFORMED_REPLY));
+            assert_eq!(parse(wrong), Err(Error::IllegalDataValue));
+            assert_eq!(parse_response(wrong), Err(Error::MalformedReply));
         }
     }
 }
@@ -118,7 +118,7 @@ fn a_declaration_does_not_change_a_function_of_the_standard() {
     }
     for code in (0x80..=0xFF).chain([0]) {
         let refused = Request::parse_with(&[code, 1], &all).map(drop);
-        assert_eq!(refused, Err(Error::ILLEGAL_FUNCTION), "{code:02X}");
+        assert_eq!(refused, Err(Error::IllegalFunction), "{code:02X}");
     }
 }
 

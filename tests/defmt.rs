@@ -7,5 +7,5 @@ use mbm::error::{Error, Status};
 fn a_status_and_an_error_can_be_logged() {
     fn can_be_logged<T: defmt::Format>(_: &T) {}
     can_be_logged(&Status::OK);
-    can_be_logged(&Error::LINK_LOST);
+    can_be_logged(&Error::LinkLost);
 }

@@ -161,7 +161,7 @@ fn a_uart_that_stays_full_ends_the_request_as_a_busy_line() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().accepts = 0;
     let port = serial(&bench);
-    assert_eq!(read(&mut bench, port), Err(Error::LINE_BUSY));
+    assert_eq!(read(&mut bench, port), Err(Error::LineBusy));
     assert!(!bench.wire.borrow().driver);
 }
 
@@ -180,7 +180,7 @@ fn an_error_of_a_stream_is_a_lost_link() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().read_fails = true;
     let port = stream(&bench);
-    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+    assert_eq!(read(&mut bench, port), Err(Error::LinkLost));
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn the_end_of_a_stream_is_a_lost_link() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().is_closed = true;
     let port = stream(&bench);
-    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+    assert_eq!(read(&mut bench, port), Err(Error::LinkLost));
 }
 
 #[test]
@@ -196,9 +196,9 @@ fn a_write_that_fails_is_a_lost_link() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().write_fails = true;
     let port = serial(&bench);
-    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+    assert_eq!(read(&mut bench, port), Err(Error::LinkLost));
     let port = stream(&bench);
-    assert_eq!(read(&mut bench, port), Err(Error::LINK_LOST));
+    assert_eq!(read(&mut bench, port), Err(Error::LinkLost));
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn a_device_that_receives_nothing_times_out() {
     bench.wire.borrow_mut().is_cut = true;
     let mut master = master(serial(&bench));
     assert_eq!(master.write_single_register(100, 1), Ok(()));
-    assert_eq!(master.wait(|| bench.pass()), Err(Error::RESPONSE_TIMED_OUT));
+    assert_eq!(master.wait(|| bench.pass()), Err(Error::ResponseTimedOut));
     assert_eq!(master.status(), Status::RESPONSE_TIMED_OUT);
 }
 

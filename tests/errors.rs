@@ -1,7 +1,7 @@
 //! Statuses as errors and as text.
 
 use core::task::Poll;
-use mbm::error::{Error, Status};
+use mbm::error::{Error, Exception, Status};
 use std::collections::HashSet;
 
 fn all() -> impl Iterator<Item = Status> {
@@ -50,9 +50,9 @@ fn a_result_is_one_byte() {
 
 #[test]
 fn an_error_can_be_matched_by_its_constant() {
-    let read: Result<u16, Error> = Err(Error::RESPONSE_TIMED_OUT);
-    assert!(matches!(read, Err(Error::RESPONSE_TIMED_OUT)));
-    assert!(!matches!(read, Err(Error::INVALID_CRC)));
+    let read: Result<u16, Error> = Err(Error::ResponseTimedOut);
+    assert!(matches!(read, Err(Error::ResponseTimedOut)));
+    assert!(!matches!(read, Err(Error::InvalidCrc)));
 }
 
 #[test]
@@ -61,13 +61,19 @@ fn status_error_and_c_have_the_same_text() {
         let text = status.text();
         assert_eq!(status.to_string(), text);
         assert_eq!(status.c_text().to_str(), Ok(text));
-        if let Err(error) = status.result() {
+        // Two errors are of Rust alone.
+        let refusals = [Error::InvalidQuantity, Error::InvalidAddress];
+        if let Some(error) = status
+            .result()
+            .err()
+            .filter(|error| !refusals.contains(error))
+        {
             assert_eq!(error.to_string(), text);
         }
     }
     assert_eq!(Status::OK.text(), "success");
     assert_eq!(
-        Error::ILLEGAL_DATA_ADDRESS.to_string(),
+        Error::IllegalDataAddress.to_string(),
         "exception 02: illegal data address"
     );
 }
@@ -92,16 +98,55 @@ fn statuses_with_a_name_have_a_text_of_their_own() {
 fn a_panic_shows_the_name_of_the_constant() {
     assert_eq!(format!("{:?}", Status::OK), "OK");
     assert_eq!(format!("{:?}", Status::PENDING), "PENDING");
-    assert_eq!(format!("{:?}", Error::LINE_BUSY), "LINE_BUSY");
+    assert_eq!(format!("{:?}", Error::LineBusy), "LineBusy");
     assert_eq!(format!("{:?}", Status::from_code(0x1F)), "0x1f");
 }
 
 #[test]
 fn an_error_can_be_boxed_with_other_errors() {
     fn read() -> Result<(), Box<dyn std::error::Error>> {
-        Err(Error::LINK_LOST)?
+        Err(Error::LinkLost)?
     }
     let boxed = read().unwrap_err();
     assert_eq!(boxed.to_string(), "the port reported a lost link");
-    assert_eq!(boxed.downcast_ref(), Some(&Error::LINK_LOST));
+    assert_eq!(boxed.downcast_ref(), Some(&Error::LinkLost));
+}
+
+#[test]
+fn an_exception_of_the_device_is_told_from_a_refusal_here() {
+    let refusals = all()
+        .filter_map(|status| status.result().err())
+        .filter(|error| error.is_refused());
+    for error in refusals {
+        assert!(
+            !error.is_exception() && error.exception().is_none(),
+            "{error:?}"
+        );
+    }
+    assert!(Error::InvalidQuantity.is_refused() && Error::InvalidAddress.is_refused());
+    assert_eq!(
+        Error::InvalidQuantity.to_string(),
+        "refused, nothing was sent: this quantity is not allowed"
+    );
+    assert!(!Error::IllegalDataValue.is_refused());
+}
+
+#[test]
+fn every_exception_code_is_an_exception_and_comes_back_from_an_error() {
+    for code in 0..=255 {
+        let exception = Exception::new(code);
+        assert_eq!(exception.is_some(), Status::from_code(code).is_exception());
+        let Some(exception) = exception else {
+            continue;
+        };
+        assert_eq!(exception.code(), code);
+        assert_eq!(Error::from(exception).code(), code);
+        assert_eq!(Error::from(exception).exception(), Some(exception));
+    }
+    for code in [0, 0x80, 0xFF] {
+        assert_eq!(
+            Error::from(Exception::Other(code)),
+            Error::ServerDeviceFailure
+        );
+    }
 }

@@ -35,11 +35,11 @@ fn length(direction: Direction, pdu: &[u8]) -> Length {
 fn right_or_refused(direction: Direction, pdu: &[u8]) {
     let expected: &[Error] = match direction {
         Direction::Request => &[
-            Error::ILLEGAL_FUNCTION,
-            Error::ILLEGAL_DATA_ADDRESS,
-            Error::ILLEGAL_DATA_VALUE,
+            Error::IllegalFunction,
+            Error::IllegalDataAddress,
+            Error::IllegalDataValue,
         ],
-        Direction::Response => &[Error::INVALID_FUNCTION, Error::MALFORMED_REPLY],
+        Direction::Response => &[Error::InvalidFunction, Error::MalformedReply],
     };
     match parse_and_emit(direction, pdu) {
         Ok(again) => assert_eq!(again, pdu),
@@ -68,9 +68,9 @@ fn every_truncated_pdu_that_contains_its_length_is_refused() {
             if !ends_with_silence(&vector) && !user {
                 let refused = parse_and_emit(vector.direction, part).unwrap_err();
                 let expected = match vector.direction {
-                    Direction::Request if end == 0 => Error::ILLEGAL_FUNCTION,
-                    Direction::Request => Error::ILLEGAL_DATA_VALUE,
-                    Direction::Response => Error::MALFORMED_REPLY,
+                    Direction::Request if end == 0 => Error::IllegalFunction,
+                    Direction::Request => Error::IllegalDataValue,
+                    Direction::Response => Error::MalformedReply,
                 };
                 assert_eq!(refused, expected, "{} cut to {end}", vector.name);
             }
@@ -89,8 +89,8 @@ fn every_longer_pdu_that_contains_its_length_is_refused() {
         if !ends_with_silence(&vector) && !user && !server_id {
             let refused = parse_and_emit(vector.direction, &longer).unwrap_err();
             let expected = match vector.direction {
-                Direction::Request => Error::ILLEGAL_DATA_VALUE,
-                Direction::Response => Error::MALFORMED_REPLY,
+                Direction::Request => Error::IllegalDataValue,
+                Direction::Response => Error::MalformedReply,
             };
             assert_eq!(refused, expected, "{} and a byte more", vector.name);
         }

@@ -42,7 +42,7 @@ fn available(value_type: u8, number: u64, count: usize, conversion: &Conversion)
     match of(&words(number, count), &field).available(conversion) {
         Ok(()) => true,
         Err(refused) => {
-            assert_eq!(refused, Error::NOT_AVAILABLE);
+            assert_eq!(refused, Error::NotAvailable);
             false
         }
     }
@@ -133,7 +133,7 @@ fn a_listed_number_is_not_available_in_every_order() {
                 .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
                 .collect();
             let refused = of(&sent, &own).available(&conversion);
-            assert_eq!(refused, Err(Error::NOT_AVAILABLE));
+            assert_eq!(refused, Err(Error::NotAvailable));
             assert_eq!(of(&sent, &own).available(&NONE), Ok(()));
         }
     }
@@ -152,7 +152,7 @@ fn bits_of_a_register_are_listed_as_their_number() {
     };
     assert_eq!(
         of(&[0x0070], &own).available(&conversion),
-        Err(Error::NOT_AVAILABLE)
+        Err(Error::NotAvailable)
     );
     assert_eq!(of(&[0xFF6F], &own).available(&conversion), Ok(()));
 }
@@ -167,11 +167,11 @@ fn a_power_that_is_not_minus_10_to_10_makes_a_value_not_available() {
     }
     for number in [-11, 11, i16::MIN, i16::MAX] {
         let refused = power(&of(&[number as u16], &field(INT16)));
-        assert_eq!(refused, Err(Error::NOT_AVAILABLE));
+        assert_eq!(refused, Err(Error::NotAvailable));
     }
     assert_eq!(
         power(&of(&[0x4120, 0], &field(FLOAT))),
-        Err(Error::INVALID_ARGUMENT)
+        Err(Error::InvalidArgument)
     );
     assert_eq!(power(&of(&[0xFFFF, 0xFFFE], &field(INT32))), Ok(-2));
 }
@@ -196,7 +196,7 @@ fn an_offset_of_a_float_is_added_to_its_exact_product() {
     assert_eq!(value(300.0, 0, -27315, 2, 0), Ok(26.85));
     assert_eq!(value(-1.5, -2, 5, 1, 2), Ok(300.5));
     assert_eq!(value(f32::INFINITY, -1, 5, 0, -10), Ok(f64::NEG_INFINITY));
-    assert_eq!(value(f32::NAN, 1, 5, 0, 0), Err(Error::NOT_AVAILABLE));
+    assert_eq!(value(f32::NAN, 1, 5, 0, 0), Err(Error::NotAvailable));
     assert_eq!(value(1e-45, 1, 1, 9, 0), Ok(1e-9));
     assert_eq!(value(f32::MAX, 1, 1, 9, 0), Ok(f32::MAX.into()));
     assert_eq!(value(0.0, 1, -27315, 2, 0), Ok(-273.15));
@@ -227,23 +227,23 @@ fn wrong_arguments_are_refused() {
     };
     assert_eq!(
         of(&[1], &own).converted(&deep, 0),
-        Err(Error::INVALID_ARGUMENT)
+        Err(Error::InvalidArgument)
     );
     assert_eq!(
         of(&[1], &own).decimal(&deep, 0, 0),
-        Err(Error::INVALID_ARGUMENT)
+        Err(Error::InvalidArgument)
     );
     assert_eq!(
         of(&[1], &own).decimal(&NONE, 0, 10),
-        Err(Error::INVALID_ARGUMENT)
+        Err(Error::InvalidArgument)
     );
     for value_type in [TEXT, REGISTERS] {
         let refused = of(&[1], &field(value_type)).converted(&NONE, 0);
-        assert_eq!(refused, Err(Error::INVALID_ARGUMENT));
+        assert_eq!(refused, Err(Error::InvalidArgument));
     }
     for value_type in [UINT64, INT64, FLOAT, DOUBLE, TEXT, REGISTERS] {
         let refused = of(&[1, 1, 1, 1], &field(value_type)).decimal(&NONE, 0, 0);
-        assert_eq!(refused, Err(Error::INVALID_ARGUMENT));
+        assert_eq!(refused, Err(Error::InvalidArgument));
     }
 }
 
@@ -251,15 +251,9 @@ fn wrong_arguments_are_refused() {
 fn a_decimal_that_does_not_fit_is_out_of_range() {
     let own = field(UINT32);
     let all = [0xFFFF, 0xFFFF];
-    assert_eq!(
-        of(&all, &own).decimal(&NONE, 0, 0),
-        Err(Error::OUT_OF_RANGE)
-    );
+    assert_eq!(of(&all, &own).decimal(&NONE, 0, 0), Err(Error::OutOfRange));
     assert_eq!(of(&all, &own).decimal(&NONE, -1, 0), Ok(429_496_730));
-    assert_eq!(
-        of(&all, &own).decimal(&NONE, 10, 9),
-        Err(Error::OUT_OF_RANGE)
-    );
+    assert_eq!(of(&all, &own).decimal(&NONE, 10, 9), Err(Error::OutOfRange));
     let own = field(INT32);
     assert_eq!(of(&[0x8000, 0], &own).decimal(&NONE, 0, 0), Ok(i32::MIN));
     assert_eq!(
@@ -345,7 +339,7 @@ proptest! {
         match of(&words, &own).decimal(&conversion, power, decimals) {
             Ok(value) => prop_assert_eq!(i128::from(value), rounded),
             Err(refused) => {
-                prop_assert_eq!(refused, Error::OUT_OF_RANGE);
+                prop_assert_eq!(refused, Error::OutOfRange);
                 let is_wide = [product, added, denominator]
                     .iter()
                     .any(|number| number.abs() >= 1 << 64);

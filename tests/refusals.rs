@@ -35,7 +35,7 @@ fn a_pdu_fits_into_a_buffer_of_its_length_and_into_no_smaller_one() {
             };
             let expected = match size == needed {
                 true => Ok(needed),
-                false => Err(Error::BUFFER_TOO_SMALL),
+                false => Err(Error::BufferTooSmall),
             };
             assert_eq!(emitted, expected, "{} into {size}", vector.name);
         }
@@ -62,10 +62,10 @@ fn reads_of_zero_or_too_many_items_are_refused() {
     for (functions, most) in [([1, 2], 2000), ([3, 4], 125)] {
         for function in functions {
             for (address, quantity, status) in [
-                (0, 0, Error::ILLEGAL_DATA_VALUE),
-                (0, most + 1, Error::ILLEGAL_DATA_VALUE),
-                (0xFFFF, 0xFFFF, Error::ILLEGAL_DATA_VALUE),
-                (0xFFFF, 2, Error::ILLEGAL_DATA_ADDRESS),
+                (0, 0, Error::IllegalDataValue),
+                (0, most + 1, Error::IllegalDataValue),
+                (0xFFFF, 0xFFFF, Error::IllegalDataValue),
+                (0xFFFF, 2, Error::IllegalDataAddress),
             ] {
                 let read = if most == 2000 {
                     Request::ReadBits {
@@ -95,7 +95,7 @@ fn writes_whose_data_do_not_match_the_quantity_are_refused() {
             quantity,
             data: &data[..length],
         };
-        refused(write, Error::ILLEGAL_DATA_VALUE);
+        refused(write, Error::IllegalDataValue);
         let both = Request::ReadWriteMultipleRegisters {
             read_address: 0,
             read_quantity: 1,
@@ -103,7 +103,7 @@ fn writes_whose_data_do_not_match_the_quantity_are_refused() {
             write_quantity: quantity,
             data: &data[..length],
         };
-        refused(both, Error::ILLEGAL_DATA_VALUE);
+        refused(both, Error::IllegalDataValue);
     }
     for (quantity, length) in [(0, 0), (1, 0), (1, 2), (9, 1), (1969, 247), (8, 257)] {
         let write = Request::WriteMultipleCoils {
@@ -111,7 +111,7 @@ fn writes_whose_data_do_not_match_the_quantity_are_refused() {
             quantity,
             data: &data[..length],
         };
-        refused(write, Error::ILLEGAL_DATA_VALUE);
+        refused(write, Error::IllegalDataValue);
     }
 }
 
@@ -173,13 +173,13 @@ fn a_variant_with_the_function_code_of_another_is_refused() {
 fn device_identification_as_a_raw_encapsulated_interface_is_refused() {
     let (mei_type, data) = (0x0E, &[1, 0][..]);
     let request = Request::EncapsulatedInterface { mei_type, data };
-    refused(request, Error::ILLEGAL_FUNCTION);
+    refused(request, Error::IllegalFunction);
     let data = &[1, 1, 0, 0, 0];
     let answer = Response::EncapsulatedInterface { mei_type, data };
-    response_refused(answer, Error::INVALID_FUNCTION);
+    response_refused(answer, Error::InvalidFunction);
     let data = &[];
     let answer = Response::EncapsulatedInterface { mei_type, data };
-    response_refused(answer, Error::MALFORMED_REPLY);
+    response_refused(answer, Error::MalformedReply);
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn reserved_sub_functions_and_values_are_refused() {
     }
     for (sub_function, data) in [(0, &[][..]), (0, &[1]), (1, &[0, 1]), (3, &[1, 1])] {
         let request = Request::Diagnostics { sub_function, data };
-        refused(request, Error::ILLEGAL_DATA_VALUE);
+        refused(request, Error::IllegalDataValue);
     }
 }
 
@@ -228,7 +228,7 @@ fn data_longer_than_any_pdu_are_refused_for_every_buffer_size() {
         for request in long {
             for space in [0, 253, 254, 66_000, 70_100] {
                 let emitted = request.emit(&mut vec![0; space]);
-                let expected = Err(Error::ILLEGAL_DATA_VALUE);
+                let expected = Err(Error::IllegalDataValue);
                 assert_eq!(emitted, expected, "{length} into {space}");
             }
         }
@@ -252,19 +252,16 @@ fn data_longer_than_any_pdu_are_refused_for_every_buffer_size() {
         for response in long {
             for space in [0, 253, 254, 66_000, 70_100] {
                 let emitted = response.emit(&mut vec![0; space]);
-                let expected = Err(Error::MALFORMED_REPLY);
+                let expected = Err(Error::MalformedReply);
                 assert_eq!(emitted, expected, "{length} into {space}");
             }
         }
     }
     let data = &data[..253];
     let function = 0x41;
-    refused(
-        Request::Custom { function, data },
-        Error::ILLEGAL_DATA_VALUE,
-    );
+    refused(Request::Custom { function, data }, Error::IllegalDataValue);
     let custom = Response::Custom { function, data };
-    response_refused(custom, Error::MALFORMED_REPLY);
+    response_refused(custom, Error::MalformedReply);
 }
 
 #[test]
@@ -276,7 +273,7 @@ fn an_event_log_of_more_than_64_events_is_refused() {
             messages: 0,
             log: &vec![0; events],
         };
-        response_refused(response, Error::MALFORMED_REPLY);
+        response_refused(response, Error::MalformedReply);
     }
 }
 
@@ -284,7 +281,7 @@ fn an_event_log_of_more_than_64_events_is_refused() {
 fn a_fifo_queue_of_half_a_register_or_more_than_31_is_refused() {
     for length in (0..=300).filter(|length| length % 2 != 0 || *length > 62) {
         let data = &vec![0; length];
-        response_refused(Response::FifoQueue { data }, Error::MALFORMED_REPLY);
+        response_refused(Response::FifoQueue { data }, Error::MalformedReply);
     }
 }
 
@@ -304,8 +301,8 @@ fn read_data_of_zero_or_too_many_bytes_or_half_a_register_are_refused() {
 
 #[test]
 fn malformed_file_records_cannot_be_constructed() {
-    let value = Error::ILLEGAL_DATA_VALUE;
-    let address = Error::ILLEGAL_DATA_ADDRESS;
+    let value = Error::IllegalDataValue;
+    let address = Error::IllegalDataAddress;
     assert_eq!(Reads::new(&[]), Err(value));
     assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0, 1, 6]), Err(value));
     assert_eq!(Reads::new(&[6, 0, 1, 0, 0, 0x80, 0]), Err(value));
@@ -331,7 +328,7 @@ fn malformed_file_records_cannot_be_constructed() {
 
 #[test]
 fn objects_that_do_not_match_their_count_or_lengths_cannot_be_constructed() {
-    let value = Err(Error::ILLEGAL_DATA_VALUE);
+    let value = Err(Error::IllegalDataValue);
     assert_eq!(ObjectList::new(1, &[0, 2, 65]), value);
     assert_eq!(ObjectList::new(1, &[0]), value);
     assert_eq!(ObjectList::new(2, &[0, 1, 65]), value);
@@ -359,7 +356,7 @@ fn device_identification_that_contradicts_itself_is_refused() {
                     let emitted = response.emit(&mut [0; BUFFER_SIZE]);
                     let expected = match right {
                         true => Ok(7 + bytes.len()),
-                        false => Err(Error::MALFORMED_REPLY),
+                        false => Err(Error::MalformedReply),
                     };
                     assert_eq!(emitted, expected, "{response:?}");
                 }

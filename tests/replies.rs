@@ -32,7 +32,7 @@ fn every_response_is_restored_from_the_data_that_the_client_stores() {
         assert_eq!(pdu[wanted.len()..], [0xEE; 253][wanted.len()..]);
         let short = &mut pdu[..wanted.len() - 1];
         let refused = state.restore_response(short, stored.len() as u8, received, sent);
-        assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
+        assert_eq!(refused, Err(Error::BufferTooSmall));
         let exception = state.exception_pdu(2);
         assert_eq!(
             Response::parse(&exception),
@@ -96,7 +96,7 @@ fn a_stream_never_requests_an_object_that_does_not_come_next() {
     let before = stream;
     assert_eq!(
         take(&mut stream, reply(true, 9, &[5, 4])),
-        Err(Error::NO_PROGRESS)
+        Err(Error::NoProgress)
     );
     assert_eq!(stream, before);
     assert_eq!(take(&mut stream, reply(true, 5, &[7])), Ok(Next::Stuck));
@@ -107,7 +107,7 @@ fn one_object_is_the_one_that_was_requested() {
     let mut stream = ObjectStream::new(INDIVIDUAL, 4);
     assert_eq!(
         take(&mut stream, reply(false, 0, &[3])),
-        Err(Error::MALFORMED_REPLY)
+        Err(Error::MalformedReply)
     );
     assert_eq!(take(&mut stream, reply(false, 0, &[4])), Ok(Next::End));
 }

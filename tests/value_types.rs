@@ -27,8 +27,8 @@ fn round_trip<T: Copy + PartialEq + std::fmt::Debug>(
         let mut registers = Registers::new(&mut words[..], FIRST, Order::Abcd).unwrap();
         let status = set(&mut registers, address, value);
         if address < FIRST || u32::from(address) + u32::from(count) > 0x1_0000 {
-            assert_eq!(status, Err(Error::ILLEGAL_DATA_ADDRESS));
-            assert_eq!(get(&registers, address), Err(Error::ILLEGAL_DATA_ADDRESS));
+            assert_eq!(status, Err(Error::IllegalDataAddress));
+            assert_eq!(get(&registers, address), Err(Error::IllegalDataAddress));
             assert_eq!(words, [FILL; 7]);
             continue;
         }
@@ -45,7 +45,7 @@ fn round_trip<T: Copy + PartialEq + std::fmt::Debug>(
 fn out_of_range(set: impl Fn(&mut Words) -> Result<(), Error>) {
     let mut words = [FILL; 7];
     let mut registers = Registers::new(&mut words[..], FIRST, Order::Abcd).unwrap();
-    assert_eq!(set(&mut registers), Err(Error::OUT_OF_RANGE));
+    assert_eq!(set(&mut registers), Err(Error::OutOfRange));
     assert_eq!(words, [FILL; 7]);
 }
 
@@ -139,7 +139,7 @@ proptest! {
         let number = raw >> (64 - bits);
         let status = registers.set_bits(order, FIRST, count, first, bits, number);
         if u16::from(first) + u16::from(bits) > 16 * count {
-            prop_assert_eq!(status, Err(Error::INVALID_ARGUMENT));
+            prop_assert_eq!(status, Err(Error::InvalidArgument));
             prop_assert_eq!(words, [FILL; 7]);
         } else {
             prop_assert_eq!(status, Ok(()));

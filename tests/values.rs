@@ -9,7 +9,7 @@ use mbm::error::Error;
 use proptest::prelude::*;
 use std::fmt::Debug;
 
-const OUTSIDE: Error = Error::ILLEGAL_DATA_ADDRESS;
+const OUTSIDE: Error = Error::IllegalDataAddress;
 
 /// Converts data bytes to words.
 fn words(bytes: &[u8]) -> Vec<u16> {
@@ -122,7 +122,7 @@ fn bits_and_bytes_of_one_register_do_not_depend_on_the_order() {
     assert_eq!(registers.bit(7, 14), Ok(false));
     assert_eq!(registers.bit(7, 1), Ok(true));
     assert_eq!(registers.bit(7, 0), Ok(false));
-    assert_eq!(registers.bit(7, 16), Err(Error::INVALID_ARGUMENT));
+    assert_eq!(registers.bit(7, 16), Err(Error::InvalidArgument));
     assert_eq!(registers.get::<u16>(7), Ok(0xFE80));
     assert_eq!(registers.get_in::<i16>(Order::Cdab, 7), Ok(-32514));
 }
@@ -135,7 +135,7 @@ fn setting_a_bit_or_a_byte_changes_no_other() {
     registers.set_bit(0, 15, false).unwrap();
     registers.set_u8(1, true, 0x12).unwrap();
     registers.set_i8(2, false, -1).unwrap();
-    assert_eq!(registers.set_bit(0, 16, true), Err(Error::INVALID_ARGUMENT));
+    assert_eq!(registers.set_bit(0, 16, true), Err(Error::InvalidArgument));
     assert_eq!(registers.set_bit(3, 0, true), Err(OUTSIDE));
     assert_eq!(words, [0x2AAB, 0x12AA, 0xAAFF]);
 }
@@ -161,7 +161,7 @@ fn a_text_ends_at_its_first_nul_or_at_the_end_of_its_field() {
 fn a_text_that_does_not_fit_into_the_buffer_is_refused() {
     let mut buffer = *b"...";
     let status = over(&b"ABCD"[..], 0).text(0, 4, &mut buffer).err();
-    assert_eq!((status, &buffer), (Some(Error::BUFFER_TOO_SMALL), b"..."));
+    assert_eq!((status, &buffer), (Some(Error::BufferTooSmall), b"..."));
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn a_text_is_written_and_filled_up_with_zeros() {
     let mut registers = over(&mut bytes[..], 0);
     registers.set_text(0, 5, b"ABC").unwrap();
     let too_long = registers.set_text(0, 5, b"ABCDEF");
-    assert_eq!(too_long, Err(Error::BUFFER_TOO_SMALL));
+    assert_eq!(too_long, Err(Error::BufferTooSmall));
     assert_eq!(registers.set_text(2, 5, b"A"), Err(OUTSIDE));
     assert_eq!(bytes, *b"ABC\0\0\0..");
     let mut registers = over(&mut bytes[..], 0);
@@ -211,7 +211,7 @@ fn the_bytes_of_a_device_that_swaps_them_are_swapped_back() {
         let mut written = over(&mut words[..], 40);
         assert_eq!(written.set_bytes_in(order, 40, wanted), Ok(()));
         let refused = written.set_bytes_in(order, 41, wanted);
-        assert_eq!(refused, Err(Error::ILLEGAL_DATA_ADDRESS));
+        assert_eq!(refused, Err(Error::IllegalDataAddress));
         let last = if order.swaps_bytes() { 0x0906 } else { 0x0509 };
         assert_eq!(words, [0x0102, 0x0304, last]);
     }
@@ -235,8 +235,8 @@ fn registers_end_at_address_65535() {
 
 #[test]
 fn an_odd_number_of_bytes_is_refused() {
-    assert_eq!(refused(&[1_u8, 2, 3][..], 0), Some(Error::INVALID_ARGUMENT));
-    assert_eq!(refused(&mut [1_u8][..], 0), Some(Error::INVALID_ARGUMENT));
+    assert_eq!(refused(&[1_u8, 2, 3][..], 0), Some(Error::InvalidArgument));
+    assert_eq!(refused(&mut [1_u8][..], 0), Some(Error::InvalidArgument));
 }
 
 fn any_order() -> impl Strategy<Value = Order> {

@@ -71,7 +71,7 @@ pub fn answer(
             let data = &mut model.place[..usize::from(quantity).div_ceil(8)];
             bits::send(
                 data,
-                words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?,
+                words.ok_or(Error::IllegalDataAddress)?,
                 quantity as u8,
             );
             Response::ReadBits { function, data }
@@ -84,19 +84,19 @@ pub fn answer(
             let from = usize::from(address);
             let words = model.words.get(from..from + usize::from(quantity));
             let data = &mut model.place[..2 * usize::from(quantity)];
-            send_words(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
+            send_words(data, words.ok_or(Error::IllegalDataAddress)?);
             Response::ReadRegisters { function, data }
         }
         Request::WriteSingleCoil { address, on } => {
             let word = model.coils.get_mut(usize::from(address / 16));
             let bit = 1 << (address % 16);
-            let word = word.ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
+            let word = word.ok_or(Error::IllegalDataAddress)?;
             *word = if on { *word | bit } else { *word & !bit };
             Response::WriteSingleCoil { address, on }
         }
         Request::WriteSingleRegister { address, value } => {
             let word = model.words.get_mut(usize::from(address));
-            *word.ok_or(Error::ILLEGAL_DATA_ADDRESS)? = value;
+            *word.ok_or(Error::IllegalDataAddress)? = value;
             Response::WriteSingleRegister { address, value }
         }
         Request::WriteMultipleCoils {
@@ -109,7 +109,7 @@ pub fn answer(
                 .coils
                 .get_mut(from..from + usize::from(quantity).div_ceil(16));
             bits::take(
-                words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?,
+                words.ok_or(Error::IllegalDataAddress)?,
                 data,
                 quantity as u8,
             );
@@ -126,7 +126,7 @@ pub fn answer(
         } => {
             let from = usize::from(address);
             let words = model.words.get_mut(from..from + usize::from(quantity));
-            take_words(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
+            take_words(words.ok_or(Error::IllegalDataAddress)?, data);
             Response::WriteMultiple {
                 function: 16,
                 address,
@@ -139,7 +139,7 @@ pub fn answer(
             or_mask,
         } => {
             let word = model.words.get_mut(usize::from(address));
-            let word = word.ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
+            let word = word.ok_or(Error::IllegalDataAddress)?;
             *word = (*word & and_mask) | (or_mask & !and_mask);
             Response::MaskWriteRegister {
                 address,
@@ -158,17 +158,17 @@ pub fn answer(
             let words = model
                 .words
                 .get_mut(from..from + usize::from(write_quantity));
-            take_words(words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?, data);
+            take_words(words.ok_or(Error::IllegalDataAddress)?, data);
             let from = usize::from(read_address);
             let words = model.words.get(from..from + usize::from(read_quantity));
             let data = &mut model.place[..2 * usize::from(read_quantity)];
-            send_words(data, words.ok_or(Error::ILLEGAL_DATA_ADDRESS)?);
+            send_words(data, words.ok_or(Error::IllegalDataAddress)?);
             Response::ReadRegisters {
                 function: 0x17,
                 data,
             }
         }
-        _ => return Err(Error::ILLEGAL_FUNCTION),
+        _ => return Err(Error::IllegalFunction),
     };
     emit(framing, buffer, |pdu| response.emit(pdu))
 }

@@ -75,7 +75,7 @@ pub unsafe extern "C" fn mbm_frame_build(
     let build = || {
         let mut packet = get(packet)?;
         if packet.lies_in(frame, capacity) {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let format = format(framing, |_| Some(packet.function))?;
         required(length)?;
@@ -182,13 +182,13 @@ pub unsafe extern "C" fn mbm_frame_exception(
     let build = || {
         let request = get(request)?;
         if request.kind != MBM_PACKET_REQUEST {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let format = format(framing, |_| None)?;
         required(length)?;
         let buffer = buffer(frame, capacity)?;
         let code = Status::from_code(code);
-        let framing = format.framing.ok_or(Error::INVALID_ARGUMENT)?;
+        let framing = format.framing.ok_or(Error::InvalidArgument)?;
         let exception = Exception::new(framing, request.head()?, code)?;
         exception.emit(framing, format.end, buffer)
     };
@@ -237,7 +237,7 @@ pub unsafe extern "C" fn mbm_frame_expectedLength(
 fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Length, Error> {
     match pdu_kind.length(bytes, own) {
         Length::Exactly(bytes) | Length::AtLeast(bytes) if bytes > MAX_PDU => {
-            Err(Error::MALFORMED_FRAME)
+            Err(Error::MalformedFrame)
         }
         length => Ok(length),
     }

@@ -49,14 +49,14 @@ impl mbm_framing {
     /// Converts the framing to the core's type. `None` is MBM_FRAMING_NONE.
     pub(super) fn core(&self) -> Result<Option<Framing>, Error> {
         match Framing::from_code(self.kind) {
-            None if self.kind != MBM_FRAMING_NONE => Err(Error::INVALID_ARGUMENT),
+            None if self.kind != MBM_FRAMING_NONE => Err(Error::InvalidArgument),
             framing => Ok(framing),
         }
     }
 
     /// As [`Self::core`], but MBM_FRAMING_NONE is an error.
     pub(super) fn of_frames(&self) -> Result<Framing, Error> {
-        self.core()?.ok_or(Error::INVALID_ARGUMENT)
+        self.core()?.ok_or(Error::InvalidArgument)
     }
 
     /// The last character of an ASCII frame.

@@ -129,7 +129,7 @@ pub(super) fn rule(rule: mbm_rule) -> Option<Rule> {
 /// The declaration of a function code, if `functions` has one.
 ///
 /// # Errors
-/// [`Error::INVALID_ARGUMENT`] if any item of `functions` is not a valid declaration.
+/// [`Error::InvalidArgument`] if any item of `functions` is not a valid declaration.
 pub(super) fn declared(
     functions: &[mbm_function],
     code: Option<u8>,
@@ -139,7 +139,7 @@ pub(super) fn declared(
         let rules = rule(function.request).zip(rule(function.response));
         let (request, response) = match rules {
             Some(rules) if (1..=127).contains(&function.code) => rules,
-            _ => return Err(Error::INVALID_ARGUMENT),
+            _ => return Err(Error::InvalidArgument),
         };
         if found.is_none() && Some(function.code) == code {
             found = Some(Function {

@@ -7,7 +7,7 @@ use mbm::error::{Error, Status};
 /// Refuses a pointer that is NULL.
 pub(crate) fn required<T>(pointer: *const T) -> Result<(), Error> {
     match pointer.is_null() {
-        true => Err(Error::INVALID_ARGUMENT),
+        true => Err(Error::InvalidArgument),
         false => Ok(()),
     }
 }
@@ -21,7 +21,7 @@ pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [
     match count {
         0 => Ok(&[]),
         _ if is_array(items, count) => Ok(from_raw_parts(items, count)),
-        _ => Err(Error::INVALID_ARGUMENT),
+        _ => Err(Error::InvalidArgument),
     }
 }
 
@@ -44,7 +44,7 @@ pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a
     match count {
         0 => Ok(&mut []),
         _ if is_array(items, count) => Ok(from_raw_parts_mut(items, count)),
-        _ => Err(Error::INVALID_ARGUMENT),
+        _ => Err(Error::InvalidArgument),
     }
 }
 
@@ -61,7 +61,7 @@ fn is_array<T>(items: *const T, count: usize) -> bool {
 pub(crate) unsafe fn buffer<'a>(bytes: *mut u8, capacity: u16) -> Result<&'a mut [u8], Error> {
     match is_array(bytes, capacity.into()) {
         true => Ok(from_raw_parts_mut(bytes, capacity.into())),
-        false => Err(Error::INVALID_ARGUMENT),
+        false => Err(Error::InvalidArgument),
     }
 }
 

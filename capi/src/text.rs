@@ -17,7 +17,7 @@ pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter
     let text = buffer(text.cast(), size)?;
     match text.first_mut() {
         Some(first) => *first = 0,
-        None => return Err(Error::BUFFER_TOO_SMALL),
+        None => return Err(Error::BufferTooSmall),
     }
     Ok(TextWriter::new(text))
 }

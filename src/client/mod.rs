@@ -118,10 +118,10 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// Queues a request. [`Client::poll`] returns it when it has ended.
     ///
     /// # Errors
-    /// [`Refused`] has the request, and one of these errors: [`Error::QUEUE_FULL`];
-    /// [`Error::BROADCAST_NOT_ALLOWED`] for unit 0, but not in TCP frames; on TCP [`Error::DUPLICATE_TRANSACTION`] if its
+    /// [`Refused`] has the request, and one of these errors: [`Error::QueueFull`];
+    /// [`Error::BroadcastNotAllowed`] for unit 0, but not in TCP frames; on TCP [`Error::DuplicateTransaction`] if its
     /// transaction number is not 0 and another pending request has the same number;
-    /// [`Error::INVALID_ARGUMENT`] if its timeout is longer than 1 000 000 ms.
+    /// [`Error::InvalidArgument`] if its timeout is longer than 1 000 000 ms.
     pub fn queue(&mut self, request: J) -> Result<(), Refused<J>> {
         self.queue.enqueue(request).map_err(Refused)
     }

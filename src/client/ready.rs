@@ -106,7 +106,7 @@ impl<'a> Request<'a> {
     /// ```
     ///
     /// # Errors
-    /// What `build` returns; [`Error::INVALID_ARGUMENT`] if `sends` has another length.
+    /// What `build` returns; [`Error::InvalidArgument`] if `sends` has another length.
     pub fn of_bytes(
         unit: u8,
         build: impl FnOnce(&mut RequestState) -> Status,
@@ -117,7 +117,7 @@ impl<'a> Request<'a> {
         let request = Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)?;
         match usize::from(request.state.data_length()) == length {
             true => Ok(request),
-            false => Err(Error::INVALID_ARGUMENT),
+            false => Err(Error::InvalidArgument),
         }
     }
 
@@ -130,7 +130,10 @@ impl<'a> Request<'a> {
         let mut state = RequestState::NONE;
         state.unit = unit.into();
         state.capacity = takes.capacity();
-        build(&mut state).result()?;
+        match build(&mut state) {
+            Status::OK => {}
+            refused => return Err(Error::refused(refused)),
+        }
         Ok(Request {
             state,
             sends,
@@ -152,8 +155,8 @@ impl<'a> Request<'a> {
     /// 01: reads 1 to 2000 coils, as many as `coils` has.
     ///
     /// # Errors
-    /// This and the other constructors return [`Error::ILLEGAL_DATA_VALUE`] for a quantity that
-    /// the standard does not allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535.
+    /// This and the other constructors return [`Error::InvalidQuantity`] for a quantity that
+    /// the standard does not allow; [`Error::InvalidAddress`] for addresses beyond 65535.
     pub fn read_coils(unit: u8, address: u16, coils: &'a mut [bool]) -> Result<Self, Error> {
         let words = (address, quantity(coils.len()));
         let spec = FunctionSpec::READ_COILS;

@@ -78,14 +78,14 @@ packed!(u8 u16);
 /// unit to zero. Units after it do not change.
 ///
 /// # Errors
-/// [`Error::BUFFER_TOO_SMALL`] if `units` cannot hold all bits; nothing is packed then.
+/// [`Error::BufferTooSmall`] if `units` cannot hold all bits; nothing is packed then.
 pub fn pack<T: Packed>(
     units: &mut [T],
     bits: impl ExactSizeIterator<Item = bool>,
 ) -> Result<(), Error> {
     let used = units
         .get_mut(..bits.len().div_ceil(T::BITS))
-        .ok_or(Error::BUFFER_TOO_SMALL)?;
+        .ok_or(Error::BufferTooSmall)?;
     let mut bits = bits.fuse();
     for unit in used {
         *unit = T::ZERO;
@@ -99,14 +99,14 @@ pub fn pack<T: Packed>(
 /// The first `quantity` bits of `units`.
 ///
 /// # Errors
-/// [`Error::ILLEGAL_DATA_ADDRESS`] if `units` holds fewer bits.
+/// [`Error::IllegalDataAddress`] if `units` holds fewer bits.
 pub fn unpack<T: Packed>(
     units: &[T],
     quantity: usize,
 ) -> Result<impl Iterator<Item = bool> + '_, Error> {
     let used = units
         .get(..quantity.div_ceil(T::BITS))
-        .ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
+        .ok_or(Error::IllegalDataAddress)?;
     Ok(used
         .iter()
         .flat_map(|unit| (0..T::BITS).map(|place| unit.bit(place)))
@@ -118,14 +118,14 @@ fn place(first: u16, quantity: u16, address: u16) -> Result<usize, Error> {
     match address.checked_sub(first) {
         // The last address is 65535; the coils must not go beyond it.
         Some(place) if place < quantity && quantity - 1 <= u16::MAX - first => Ok(place.into()),
-        _ => Err(Error::ILLEGAL_DATA_ADDRESS),
+        _ => Err(Error::IllegalDataAddress),
     }
 }
 
 /// True if the coil `address` is set. `units` holds `quantity` coils that begin at `first`.
 ///
 /// # Errors
-/// [`Error::ILLEGAL_DATA_ADDRESS`] if the coil is not one of these.
+/// [`Error::IllegalDataAddress`] if the coil is not one of these.
 pub fn is_set<T: Packed>(
     units: &[T],
     first: u16,
@@ -134,14 +134,14 @@ pub fn is_set<T: Packed>(
 ) -> Result<bool, Error> {
     let place = place(first, quantity, address)?;
     let unit = units.get(place / T::BITS);
-    Ok(unit.ok_or(Error::ILLEGAL_DATA_ADDRESS)?.bit(place))
+    Ok(unit.ok_or(Error::IllegalDataAddress)?.bit(place))
 }
 
 /// Switches the coil `address` on or off. `units` holds `quantity` coils that begin at
 /// `first`.
 ///
 /// # Errors
-/// [`Error::ILLEGAL_DATA_ADDRESS`] if the coil is not one of these; nothing is changed
+/// [`Error::IllegalDataAddress`] if the coil is not one of these; nothing is changed
 /// then.
 pub fn set<T: Packed>(
     units: &mut [T],
@@ -153,7 +153,7 @@ pub fn set<T: Packed>(
     let place = place(first, quantity, address)?;
     let unit = units
         .get_mut(place / T::BITS)
-        .ok_or(Error::ILLEGAL_DATA_ADDRESS)?;
+        .ok_or(Error::IllegalDataAddress)?;
     *unit = unit.with_bit(place, on);
     Ok(())
 }
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_coil_outside_the_range_is_an_illegal_data_address() {
-        let none = Err(Error::ILLEGAL_DATA_ADDRESS);
+        let none = Err(Error::IllegalDataAddress);
         for address in [0, 18, 38, 39, 65535] {
             assert_eq!(is_set(&COILS, 19, 19, address), none);
             assert_eq!(
@@ -246,7 +246,7 @@ mod tests {
     fn bits_that_do_not_fit_are_not_packed() {
         let mut bytes = [0xFF_u8];
         let status = pack(&mut bytes, [false; 9].into_iter());
-        assert_eq!((status, bytes), (Err(Error::BUFFER_TOO_SMALL), [0xFF]));
-        assert_eq!(unpack(&bytes, 9).err(), Some(Error::ILLEGAL_DATA_ADDRESS));
+        assert_eq!((status, bytes), (Err(Error::BufferTooSmall), [0xFF]));
+        assert_eq!(unpack(&bytes, 9).err(), Some(Error::IllegalDataAddress));
     }
 }

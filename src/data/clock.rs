@@ -57,7 +57,7 @@ impl<'a> Layout<'a> {
     /// Checks a layout, such as `Y M D h m s`.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a layout with another letter, a letter twice, more than two
+    /// [`Error::InvalidArgument`] for a layout with another letter, a letter twice, more than two
     /// letters for a register, a year or milliseconds in one byte, a month without a day, or
     /// neither month nor hour.
     pub fn new(text: &'a [u8], is_bcd: bool) -> Result<Layout<'a>, Error> {
@@ -65,14 +65,14 @@ impl<'a> Layout<'a> {
         let mut seen = 0u16;
         for group in text.split(|one| *one == b' ') {
             if !matches!(group.len(), 1 | 2) {
-                return Err(Error::INVALID_ARGUMENT);
+                return Err(Error::InvalidArgument);
             }
             for letter in group {
-                let part = part_of(*letter).ok_or(Error::INVALID_ARGUMENT)?;
+                let part = part_of(*letter).ok_or(Error::InvalidArgument)?;
                 let is_wide = matches!(part, YEAR | MILLISECOND);
                 let bit = 1 << part;
                 if is_wide && group.len() == 2 || part != NOTHING && seen & bit != 0 {
-                    return Err(Error::INVALID_ARGUMENT);
+                    return Err(Error::InvalidArgument);
                 }
                 seen |= bit;
             }
@@ -90,7 +90,7 @@ impl<'a> Layout<'a> {
         if is_right {
             Ok(layout)
         } else {
-            Err(Error::INVALID_ARGUMENT)
+            Err(Error::InvalidArgument)
         }
     }
 
@@ -145,7 +145,7 @@ impl<'a> Layout<'a> {
             flags: 0,
         };
         if !self.is_for(&date) {
-            return Err(Error::MALFORMED_VALUE);
+            return Err(Error::MalformedValue);
         }
         Ok(date)
     }
@@ -153,7 +153,7 @@ impl<'a> Layout<'a> {
     /// The parts of a date.
     fn parts(&self, date: &Date) -> Result<[u16; PARTS], Error> {
         if !self.is_for(date) {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let mut parts = [0; PARTS];
         parts[YEAR] = date.year;
@@ -174,7 +174,7 @@ impl<'a> Layout<'a> {
         for part in [HOUR, MINUTE, SECOND, MILLISECOND] {
             let letter = LETTERS.get(part).unwrap_or(&0);
             if parts.get(part) != Some(&0) && !self.text.contains(letter) {
-                return Err(Error::OUT_OF_RANGE);
+                return Err(Error::OutOfRange);
             }
         }
         Ok(parts)
@@ -191,7 +191,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// that swaps bytes swaps those of each register.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::MALFORMED_VALUE`] for a date that does not exist,
+    /// [`Error::IllegalDataAddress`]; [`Error::MalformedValue`] for a date that does not exist,
     /// or a digit above 9.
     pub fn date(&self, layout: &Layout, order: Order, address: u16) -> Result<Date, Error> {
         let length = 2 * usize::from(layout.registers());
@@ -221,8 +221,8 @@ impl<C: RegisterBytes> Registers<C> {
     /// them from the last one on.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count, or an order
-    /// by halves; [`Error::MALFORMED_VALUE`] for a date that does not exist.
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count, or an order
+    /// by halves; [`Error::MalformedValue`] for a date that does not exist.
     pub fn iec870_date(&self, order: Order, address: u16, count: u16) -> Result<Date, Error> {
         let [year, days, minutes, milliseconds] = iec870_places(order, count)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
@@ -243,7 +243,7 @@ impl<C: RegisterBytes> Registers<C> {
         if date.exists() {
             Ok(date)
         } else {
-            Err(Error::MALFORMED_VALUE)
+            Err(Error::MalformedValue)
         }
     }
 }
@@ -252,8 +252,8 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets the date that [`Registers::date`] reads.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for a date that does not
-    /// exist; [`Error::OUT_OF_RANGE`] for one that the registers cannot hold exactly. Nothing is
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for a date that does not
+    /// exist; [`Error::OutOfRange`] for one that the registers cannot hold exactly. Nothing is
     /// set then.
     pub fn set_date(
         &mut self,
@@ -273,14 +273,14 @@ impl<C: RegisterBytesMut> Registers<C> {
                 number
             };
             if place.is_byte && raw > 0xFF {
-                return Err(Error::OUT_OF_RANGE);
+                return Err(Error::OutOfRange);
             }
             Ok(raw)
         };
         if layout.text.contains(&b'n') && date.year < 1900
             || layout.text.contains(&b'y') && !layout.text.contains(&b'C') && date.year < 2000
         {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         for place in layout.places() {
             let _ = number(place)?;
@@ -302,7 +302,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// for none.
     ///
     /// # Errors
-    /// As [`Registers::set_date`]; [`Error::INVALID_ARGUMENT`] also for another count or an order by
+    /// As [`Registers::set_date`]; [`Error::InvalidArgument`] also for another count or an order by
     /// halves.
     pub fn set_iec870_date(
         &mut self,
@@ -314,11 +314,11 @@ impl<C: RegisterBytesMut> Registers<C> {
         let places = iec870_places(order, count)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
         if !date.exists() || date.is_time_only() {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let milliseconds = u16::from(date.second) * 1000 + date.millisecond;
         if date.year < 2000 || date.year > 2127 || count == 3 && milliseconds != 0 {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         let flag = |flag: u8, bit: u16| if date.flags & flag == 0 { 0 } else { bit };
         let words = [
@@ -341,7 +341,7 @@ impl<C: RegisterBytesMut> Registers<C> {
 fn iec870_places(order: Order, count: u16) -> Result<[u16; 4], Error> {
     // An order by halves has no place for three registers.
     if !matches!(count, 3 | 4) || order.place(0, 3).is_none() {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     Ok([0, 1, 2, 3].map(|nth| order.place(nth, count).unwrap_or(0)))
 }

@@ -80,10 +80,10 @@ impl Date {
     /// The seconds since 1970-01-01 00:00:00, as if the time zone were UTC; without milliseconds.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] if the date does not exist, or for a time without a date.
+    /// [`Error::InvalidArgument`] if the date does not exist, or for a time without a date.
     pub fn seconds(&self) -> Result<i64, Error> {
         if !self.exists() || self.is_time_only() {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let mut days = days_before(self.year) + u32::from(self.day) - 1;
         for month in 1..self.month {
@@ -97,12 +97,12 @@ impl Date {
     /// The date that is so many seconds after 1970-01-01 00:00:00.
     ///
     /// # Errors
-    /// [`Error::OUT_OF_RANGE`] for a date before the year 1 or after 9999.
+    /// [`Error::OutOfRange`] for a date before the year 1 or after 9999.
     pub fn of_seconds(seconds: i64) -> Result<Date, Error> {
         const FIRST: i64 = -SECONDS_BEFORE_1970;
         const END: i64 = days_before(10_000) as i64 * SECONDS_PER_DAY as i64 + FIRST;
         if !(FIRST..END).contains(&seconds) {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         let seconds = seconds - FIRST;
         let mut days = (seconds >> 7) as u32 / PARTS_PER_DAY;
@@ -160,7 +160,7 @@ mod tests {
         }
         // 400 years have 97 leap days.
         assert_eq!(days, 146_097 * 25 - 366);
-        assert_eq!(Date::of_seconds(seconds), Err(Error::OUT_OF_RANGE));
+        assert_eq!(Date::of_seconds(seconds), Err(Error::OutOfRange));
         assert!(Date::of_seconds(seconds - 1).is_ok());
     }
 
@@ -187,7 +187,7 @@ mod tests {
             assert_eq!(known.seconds(), Ok(seconds));
         }
         for seconds in [i64::MIN, -62_135_596_801, 253_402_300_800, i64::MAX] {
-            assert_eq!(Date::of_seconds(seconds), Err(Error::OUT_OF_RANGE));
+            assert_eq!(Date::of_seconds(seconds), Err(Error::OutOfRange));
         }
     }
 
@@ -207,7 +207,7 @@ mod tests {
         ] {
             assert_eq!(
                 date(year, month, day).seconds(),
-                Err(Error::INVALID_ARGUMENT)
+                Err(Error::InvalidArgument)
             );
         }
         assert!(date(2000, 2, 29).exists());

@@ -7,13 +7,13 @@ use crate::error::Error;
 /// The number of 8 digits of BCD.
 ///
 /// # Errors
-/// [`Error::MALFORMED_VALUE`] for a digit above 9.
+/// [`Error::MalformedValue`] for a digit above 9.
 pub fn from_bcd(raw: u32) -> Result<u32, Error> {
     let mut number = 0;
     for nth in (0..8).rev() {
         let digit = raw >> (4 * nth) & 15;
         if digit > 9 {
-            return Err(Error::MALFORMED_VALUE);
+            return Err(Error::MalformedValue);
         }
         number = number * 10 + digit;
     }
@@ -23,7 +23,7 @@ pub fn from_bcd(raw: u32) -> Result<u32, Error> {
 /// A number as `digits` digits of BCD, at most 8.
 ///
 /// # Errors
-/// [`Error::OUT_OF_RANGE`] for a number with more digits.
+/// [`Error::OutOfRange`] for a number with more digits.
 pub fn to_bcd(number: u32, digits: u32) -> Result<u32, Error> {
     let (mut left, mut raw) = (number, 0);
     for nth in 0..digits.min(8) {
@@ -31,7 +31,7 @@ pub fn to_bcd(number: u32, digits: u32) -> Result<u32, Error> {
         left /= 10;
     }
     if left > 0 {
-        return Err(Error::OUT_OF_RANGE);
+        return Err(Error::OutOfRange);
     }
     Ok(raw)
 }
@@ -42,7 +42,7 @@ const M10K: u16 = 10_000;
 /// The number of `count` registers of modulo 10000, each 0 to 9999.
 ///
 /// # Errors
-/// [`Error::MALFORMED_VALUE`] for a register above 9999.
+/// [`Error::MalformedValue`] for a register above 9999.
 pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
     number_of(raw, count, |part| part < M10K)
 }
@@ -50,7 +50,7 @@ pub fn from_m10k(raw: u64, count: u16) -> Result<u64, Error> {
 /// The number of `count` registers of modulo 10000, each -9999 to 9999 in two's complement.
 ///
 /// # Errors
-/// [`Error::MALFORMED_VALUE`] for a register beyond that.
+/// [`Error::MalformedValue`] for a register beyond that.
 pub fn from_signed_m10k(raw: u64, count: u16) -> Result<i64, Error> {
     let is_right = |part: u16| part.cast_signed().unsigned_abs() < M10K;
     number_of(raw, count, is_right).map(u64::cast_signed)
@@ -67,7 +67,7 @@ fn number_of(raw: u64, count: u16, is_right: impl Fn(u16) -> bool) -> Result<u64
         let part = (left >> 48) as u16;
         left <<= 16;
         if !is_right(part) {
-            return Err(Error::MALFORMED_VALUE);
+            return Err(Error::MalformedValue);
         }
         number = times_small(number, M10K).0;
         number = number.wrapping_add(i64::from(part.cast_signed()).cast_unsigned());
@@ -78,14 +78,14 @@ fn number_of(raw: u64, count: u16, is_right: impl Fn(u16) -> bool) -> Result<u64
 /// A number in `count` registers of modulo 10000.
 ///
 /// # Errors
-/// [`Error::OUT_OF_RANGE`] for a number with more than four digits for each register.
+/// [`Error::OutOfRange`] for a number with more than four digits for each register.
 pub fn to_m10k(number: u64, count: u16) -> Result<u64, Error> {
     let (mut left, mut words) = (number, [0; 4]);
     for word in words.iter_mut().take(count.into()) {
         (left, *word) = divide_small(left, M10K);
     }
     if left > 0 {
-        return Err(Error::OUT_OF_RANGE);
+        return Err(Error::OutOfRange);
     }
     Ok(joined(words))
 }
@@ -126,7 +126,7 @@ mod tests {
         for raw in 0..=0xFFFF {
             let digits = [raw >> 12, raw >> 8 & 15, raw >> 4 & 15, raw & 15];
             if digits.iter().any(|digit| *digit > 9) {
-                assert_eq!(from_bcd(raw), Err(Error::MALFORMED_VALUE));
+                assert_eq!(from_bcd(raw), Err(Error::MalformedValue));
                 continue;
             }
             let number = digits.iter().fold(0, |sum, digit| sum * 10 + digit);
@@ -135,16 +135,16 @@ mod tests {
             numbers += 1;
         }
         assert_eq!(numbers, 10_000);
-        assert_eq!(to_bcd(10_000, 4), Err(Error::OUT_OF_RANGE));
+        assert_eq!(to_bcd(10_000, 4), Err(Error::OutOfRange));
     }
 
     #[test]
     fn eight_digits_of_bcd_are_two_registers() {
         assert_eq!(from_bcd(0x1234_5678), Ok(12_345_678));
         assert_eq!(to_bcd(99_999_999, 8), Ok(0x9999_9999));
-        assert_eq!(to_bcd(100_000_000, 8), Err(Error::OUT_OF_RANGE));
-        assert_eq!(from_bcd(0xA000_0000), Err(Error::MALFORMED_VALUE));
-        assert_eq!(from_bcd(0x0000_000F), Err(Error::MALFORMED_VALUE));
+        assert_eq!(to_bcd(100_000_000, 8), Err(Error::OutOfRange));
+        assert_eq!(from_bcd(0xA000_0000), Err(Error::MalformedValue));
+        assert_eq!(from_bcd(0x0000_000F), Err(Error::MalformedValue));
     }
 
     #[test]
@@ -153,9 +153,9 @@ mod tests {
         assert_eq!(from_m10k(0x0000_002B_18D4_0108, 4), Ok(4_363_560_264));
         assert_eq!(to_m10k(4_363_560_264, 4), Ok(0x0000_002B_18D4_0108));
         assert_eq!(from_m10k(0x270F_270F, 2), Ok(99_999_999));
-        assert_eq!(to_m10k(100_000_000, 2), Err(Error::OUT_OF_RANGE));
-        assert_eq!(from_m10k(0x2710_0000, 2), Err(Error::MALFORMED_VALUE));
-        assert_eq!(from_m10k(0x0000_FFFF, 2), Err(Error::MALFORMED_VALUE));
+        assert_eq!(to_m10k(100_000_000, 2), Err(Error::OutOfRange));
+        assert_eq!(from_m10k(0x2710_0000, 2), Err(Error::MalformedValue));
+        assert_eq!(from_m10k(0x0000_FFFF, 2), Err(Error::MalformedValue));
         assert_eq!(to_m10k(9_999_999_999_999_999, 4), Ok(0x270F_270F_270F_270F));
     }
 
@@ -166,12 +166,9 @@ mod tests {
         assert_eq!(from_signed_m10k(raw, 3), Ok(-123_456_789));
         assert_eq!(to_signed_m10k(-123_456_789, 3), Ok(raw));
         assert_eq!(to_signed_m10k(-10_000, 2), Ok(0xFFFF_0000));
-        assert_eq!(
-            from_signed_m10k(0xD8F0_0000, 2),
-            Err(Error::MALFORMED_VALUE)
-        );
-        assert_eq!(from_signed_m10k(0x8000, 1), Err(Error::MALFORMED_VALUE));
-        assert_eq!(to_signed_m10k(-100_000_000, 2), Err(Error::OUT_OF_RANGE));
-        assert_eq!(to_signed_m10k(i64::MIN, 4), Err(Error::OUT_OF_RANGE));
+        assert_eq!(from_signed_m10k(0xD8F0_0000, 2), Err(Error::MalformedValue));
+        assert_eq!(from_signed_m10k(0x8000, 1), Err(Error::MalformedValue));
+        assert_eq!(to_signed_m10k(-100_000_000, 2), Err(Error::OutOfRange));
+        assert_eq!(to_signed_m10k(i64::MIN, 4), Err(Error::OutOfRange));
     }
 }

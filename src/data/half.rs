@@ -33,7 +33,7 @@ pub fn to_float(half: u16) -> u32 {
 /// The binary16 nearest to a binary32, both as bits; of two that are equally near the even one.
 ///
 /// # Errors
-/// [`Error::OUT_OF_RANGE`] for a number of 65520 or more, which would become infinite, and for
+/// [`Error::OutOfRange`] for a number of 65520 or more, which would become infinite, and for
 /// one that is not 0 but would become 0.
 pub fn from_float(bits: u32) -> Result<u16, Error> {
     let sign = (bits >> 16 & 0x8000) as u16;
@@ -44,7 +44,7 @@ pub fn from_float(bits: u32) -> Result<u16, Error> {
         return Ok(sign | (HALF_MAX << 10) as u16 | (fraction >> 13) as u16 | quiet);
     }
     if exponent >= BIAS + HALF_MAX {
-        return Err(Error::OUT_OF_RANGE);
+        return Err(Error::OutOfRange);
     }
     let (whole, lost) = if exponent > BIAS {
         ((exponent - BIAS) << 23 | fraction, 13)
@@ -60,7 +60,7 @@ pub fn from_float(bits: u32) -> Result<u16, Error> {
         kept += 1;
     }
     if kept >= HALF_MAX << 10 || kept == 0 && (exponent | fraction) != 0 {
-        return Err(Error::OUT_OF_RANGE);
+        return Err(Error::OutOfRange);
     }
     Ok(sign | kept as u16)
 }
@@ -128,7 +128,7 @@ mod tests {
             let above = f32::from_bits(middle.to_bits() + 1);
             assert_eq!(from_float(above.to_bits()), Ok(half + 1));
             if half == 0 {
-                assert_eq!(from_float(middle.to_bits()), Err(Error::OUT_OF_RANGE));
+                assert_eq!(from_float(middle.to_bits()), Err(Error::OutOfRange));
                 continue;
             }
             assert_eq!(from_float(middle.to_bits()), Ok(even));
@@ -148,7 +148,7 @@ mod tests {
             -1e-8,
             f32::from_bits(1),
         ] {
-            assert_eq!(from_float(float.to_bits()), Err(Error::OUT_OF_RANGE));
+            assert_eq!(from_float(float.to_bits()), Err(Error::OutOfRange));
         }
         assert_eq!(from_float(65519.0_f32.to_bits()), Ok(0x7BFF));
         assert_eq!(from_float((-0.0_f32).to_bits()), Ok(0x8000));

@@ -10,14 +10,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// The bits of `count` registers, 1 to 4.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count, or for an
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count, or for an
     /// order by halves of three registers.
     pub fn raw(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
         check_count(count, 4)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
         let mut raw = 0;
         for nth in 0..count {
-            let place = order.place(nth, count).ok_or(Error::INVALID_ARGUMENT)?;
+            let place = order.place(nth, count).ok_or(Error::InvalidArgument)?;
             let word: u16 = self.get_in(order, address.wrapping_add(place))?;
             raw = raw << 16 | u64::from(word);
         }
@@ -28,7 +28,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// least significant.
     ///
     /// # Errors
-    /// As [`Registers::raw`]; [`Error::INVALID_ARGUMENT`] also for no bits, or for bits beyond
+    /// As [`Registers::raw`]; [`Error::InvalidArgument`] also for no bits, or for bits beyond
     /// those of the registers.
     pub fn bits(
         &self,
@@ -50,7 +50,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets the bits of `count` registers, 1 to 4.
     ///
     /// # Errors
-    /// As [`Registers::raw`]; [`Error::OUT_OF_RANGE`] for a number with more bits. Nothing is set
+    /// As [`Registers::raw`]; [`Error::OutOfRange`] for a number with more bits. Nothing is set
     /// then.
     pub fn set_raw(
         &mut self,
@@ -66,11 +66,11 @@ impl<C: RegisterBytesMut> Registers<C> {
             left >>= 16;
         }
         if left != 0 {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         left = raw;
         for nth in (0..count).rev() {
-            let place = order.place(nth, count).ok_or(Error::INVALID_ARGUMENT)?;
+            let place = order.place(nth, count).ok_or(Error::InvalidArgument)?;
             self.set_in(order, address.wrapping_add(place), left as u16)?;
             left >>= 16;
         }
@@ -80,7 +80,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets `bits` of the bits of `count` registers, from bit `first` on; the others do not change.
     ///
     /// # Errors
-    /// As [`Registers::bits`]; [`Error::OUT_OF_RANGE`] for a number with more bits. Nothing is set
+    /// As [`Registers::bits`]; [`Error::OutOfRange`] for a number with more bits. Nothing is set
     /// then.
     pub fn set_bits(
         &mut self,
@@ -93,7 +93,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     ) -> Result<(), Error> {
         let mask = mask_of(count, first, bits)?;
         if number > shifted_right(mask, first) {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         let others = self.raw(order, address, count)? & !mask;
         let raw = others | shifted_left(number, first);
@@ -104,7 +104,7 @@ impl<C: RegisterBytesMut> Registers<C> {
 /// Refuses a count of registers that is not 1 to `most`.
 pub(super) fn check_count(count: u16, most: u16) -> Result<(), Error> {
     if count.wrapping_sub(1) >= most {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     Ok(())
 }
@@ -113,7 +113,7 @@ pub(super) fn check_count(count: u16, most: u16) -> Result<(), Error> {
 fn mask_of(count: u16, first: u8, bits: u8) -> Result<u64, Error> {
     let end = u16::from(first) + u16::from(bits);
     if bits == 0 || end > 64 || end > count.saturating_mul(16) {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     Ok(shifted_left(shifted_right(u64::MAX, 64 - bits), first))
 }

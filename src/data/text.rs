@@ -49,7 +49,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// spaces, those at its end are left out.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if `buffer` cannot hold the
+    /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if `buffer` cannot hold the
     /// text. Nothing is copied then.
     pub fn text_of<'b>(
         &self,
@@ -68,7 +68,7 @@ impl<C: RegisterBytes> Registers<C> {
         while form.has_spaces && count > 0 && character(count - 1) == b' ' {
             count -= 1;
         }
-        let text = buffer.get_mut(..count).ok_or(Error::BUFFER_TOO_SMALL)?;
+        let text = buffer.get_mut(..count).ok_or(Error::BufferTooSmall)?;
         for (place, byte) in text.iter_mut().enumerate() {
             *byte = character(place);
         }
@@ -81,8 +81,8 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Registers::text_of`] reads it. Every byte of its registers is set.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if the text is longer than
-    /// the field; [`Error::INVALID_ARGUMENT`] if the form has spaces and the text ends with one,
+    /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if the text is longer than
+    /// the field; [`Error::InvalidArgument`] if the form has spaces and the text ends with one,
     /// which would be lost. Nothing is set then.
     pub fn set_text_of(
         &mut self,
@@ -95,10 +95,10 @@ impl<C: RegisterBytesMut> Registers<C> {
         let registers = form.registers(length);
         let start = self.byte_index(address, 2 * registers)?;
         if text.len() > length {
-            return Err(Error::BUFFER_TOO_SMALL);
+            return Err(Error::BufferTooSmall);
         }
         if form.has_spaces && text.last() == Some(&b' ') {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let rest = if form.has_spaces { b' ' } else { 0 };
         for byte in 0..2 * registers {

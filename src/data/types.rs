@@ -12,8 +12,8 @@ impl<C: RegisterBytes> Registers<C> {
     /// A number in BCD: four digits in one register, eight in two.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count;
-    /// [`Error::MALFORMED_VALUE`] for a digit above 9.
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count;
+    /// [`Error::MalformedValue`] for a digit above 9.
     pub fn bcd(&self, order: Order, address: u16, count: u16) -> Result<u32, Error> {
         check_count(count, 2)?;
         digits::from_bcd(self.raw(order, address, count)? as u32)
@@ -23,7 +23,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// Schneider calls M10K or Mod10.
     ///
     /// # Errors
-    /// As [`Registers::raw`]; [`Error::MALFORMED_VALUE`] for a register above 9999.
+    /// As [`Registers::raw`]; [`Error::MalformedValue`] for a register above 9999.
     pub fn m10k(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
         digits::from_m10k(self.raw(order, address, count)?, count)
     }
@@ -40,7 +40,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// count.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn u24(&self, order: Order, address: u16) -> Result<u32, Error> {
         Ok(self.get_in::<u32>(order, address)? & 0x00FF_FFFF)
     }
@@ -48,7 +48,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// As [`Registers::u24`], in two's complement.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn i24(&self, order: Order, address: u16) -> Result<i32, Error> {
         Ok((self.get_in::<u32>(order, address)? << 8).cast_signed() >> 8)
     }
@@ -56,7 +56,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// An integer of 48 bits in three registers.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for an order by halves.
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for an order by halves.
     pub fn u48(&self, order: Order, address: u16) -> Result<u64, Error> {
         self.raw(order, address, 3)
     }
@@ -73,7 +73,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// the magnitude. Both zeros are 0.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] for another count.
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count.
     pub fn sign_magnitude(&self, order: Order, address: u16, count: u16) -> Result<i32, Error> {
         check_count(count, 2)?;
         let raw = self.raw(order, address, count)? as u32;
@@ -89,7 +89,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// A half float, an IEEE 754 binary16, in one register.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn half(&self, order: Order, address: u16) -> Result<f32, Error> {
         let half: u16 = self.get_in(order, address)?;
         Ok(f32::from_bits(half::to_float(half)))
@@ -100,7 +100,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::bcd`] reads.
     ///
     /// # Errors
-    /// As [`Registers::bcd`]; [`Error::OUT_OF_RANGE`] for a number with more digits.
+    /// As [`Registers::bcd`]; [`Error::OutOfRange`] for a number with more digits.
     pub fn set_bcd(
         &mut self,
         order: Order,
@@ -116,7 +116,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::m10k`] reads.
     ///
     /// # Errors
-    /// As [`Registers::raw`]; [`Error::OUT_OF_RANGE`] for a number with more digits.
+    /// As [`Registers::raw`]; [`Error::OutOfRange`] for a number with more digits.
     pub fn set_m10k(
         &mut self,
         order: Order,
@@ -147,10 +147,10 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::u24`] reads; the eight bits above it become 0.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    /// [`Error::IllegalDataAddress`]; [`Error::OutOfRange`] for a number with more bits.
     pub fn set_u24(&mut self, order: Order, address: u16, number: u32) -> Result<(), Error> {
         if number >> 24 != 0 {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         self.set_in(order, address, number)
     }
@@ -161,7 +161,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set_u24`].
     pub fn set_i24(&mut self, order: Order, address: u16, number: i32) -> Result<(), Error> {
         if number << 8 >> 8 != number {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         self.set_in(order, address, number)
     }
@@ -169,7 +169,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::u48`] reads.
     ///
     /// # Errors
-    /// As [`Registers::u48`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    /// As [`Registers::u48`]; [`Error::OutOfRange`] for a number with more bits.
     pub fn set_u48(&mut self, order: Order, address: u16, number: u64) -> Result<(), Error> {
         self.set_raw(order, address, 3, number)
     }
@@ -180,7 +180,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set_u48`].
     pub fn set_i48(&mut self, order: Order, address: u16, number: i64) -> Result<(), Error> {
         if number << 16 >> 16 != number {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         self.set_raw(order, address, 3, number.cast_unsigned() << 16 >> 16)
     }
@@ -188,7 +188,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::sign_magnitude`] reads.
     ///
     /// # Errors
-    /// As [`Registers::sign_magnitude`]; [`Error::OUT_OF_RANGE`] for a number with more bits.
+    /// As [`Registers::sign_magnitude`]; [`Error::OutOfRange`] for a number with more bits.
     pub fn set_sign_magnitude(
         &mut self,
         order: Order,
@@ -200,7 +200,7 @@ impl<C: RegisterBytesMut> Registers<C> {
         let sign = sign_of(count);
         let magnitude = number.unsigned_abs();
         if magnitude >= sign {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         let raw = if number < 0 {
             magnitude | sign
@@ -213,7 +213,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets what [`Registers::half`] reads, rounded to the nearest half.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::OUT_OF_RANGE`] for a number that would become
+    /// [`Error::IllegalDataAddress`]; [`Error::OutOfRange`] for a number that would become
     /// infinite, or 0 without being 0.
     pub fn set_half(&mut self, order: Order, address: u16, number: f32) -> Result<(), Error> {
         self.set_in(order, address, half::from_float(number.to_bits())?)

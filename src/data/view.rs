@@ -1,7 +1,7 @@
 //! Typed values in registers, accessed by register address. The registers are data bytes
 //! in the order of the wire, or words as the master stores them.
 //!
-//! An access beyond the registers returns [`Error::ILLEGAL_DATA_ADDRESS`]; nothing panics.
+//! An access beyond the registers returns [`Error::IllegalDataAddress`]; nothing panics.
 
 use super::order::Order;
 use super::value::Value;
@@ -98,15 +98,15 @@ impl<C: RegisterBytes> Registers<C> {
     /// Registers in `cells`; the first has the address `first`.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`] if they go beyond address 65535;
-    /// [`Error::INVALID_ARGUMENT`] if the number of bytes is odd.
+    /// [`Error::IllegalDataAddress`] if they go beyond address 65535;
+    /// [`Error::InvalidArgument`] if the number of bytes is odd.
     pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Error> {
         let length = cells.length();
         if !length.is_multiple_of(2) {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         if length / 2 > usize::from(u16::MAX - first).saturating_add(1) {
-            return Err(Error::ILLEGAL_DATA_ADDRESS);
+            return Err(Error::IllegalDataAddress);
         }
         Ok(Registers {
             cells,
@@ -125,14 +125,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// exist.
     pub(super) fn byte_index(&self, address: u16, length: usize) -> Result<usize, Error> {
         let Some(before) = address.checked_sub(self.first) else {
-            return Err(Error::ILLEGAL_DATA_ADDRESS);
+            return Err(Error::IllegalDataAddress);
         };
         // Counted in registers, so that a `usize` of 16 bits does not overflow.
         let whole = self.cells.length() / 2;
         let wanted = length.div_ceil(2);
         match whole.checked_sub(before.into()) {
             Some(left) if wanted <= left => Ok(2 * usize::from(before)),
-            _ => Err(Error::ILLEGAL_DATA_ADDRESS),
+            _ => Err(Error::IllegalDataAddress),
         }
     }
 
@@ -145,7 +145,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// becomes `bytes[n ^ mask]`, see [`Order::mask`].
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    /// [`Error::IllegalDataAddress`]; nothing is copied then.
     pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter_mut().enumerate() {
@@ -157,7 +157,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// The number that begins at the register `address`, in the order [`Registers::order`].
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn get<T: Value>(&self, address: u16) -> Result<T, Error> {
         self.get_in(self.order, address)
     }
@@ -165,7 +165,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// As [`Registers::get`], in another order.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn get_in<T: Value>(&self, order: Order, address: u16) -> Result<T, Error> {
         let mut bytes = T::Bytes::default();
         let mask = order.mask(bytes.as_ref().len());
@@ -176,7 +176,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// Copies raw bytes in the order of the wire, from the high byte of `address` on.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    /// [`Error::IllegalDataAddress`]; nothing is copied then.
     pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, 0, bytes)
     }
@@ -186,7 +186,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// every `order`.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is copied then.
+    /// [`Error::IllegalDataAddress`]; nothing is copied then.
     pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, order.swaps_bytes().into(), bytes)
     }
@@ -194,7 +194,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// The high or the low byte of a register.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn u8(&self, address: u16, high: bool) -> Result<u8, Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         Ok(self.cells.byte(place).unwrap_or(0))
@@ -203,7 +203,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// As [`Registers::u8`], signed.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn i8(&self, address: u16, high: bool) -> Result<i8, Error> {
         self.u8(address, high).map(u8::cast_signed)
     }
@@ -211,7 +211,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// Bit `bit` of a register; bit 0 is the least significant.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] if `bit` is greater
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] if `bit` is greater
     /// than 15.
     pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Error> {
         let (high, mask) = byte_of_bit(bit)?;
@@ -223,7 +223,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// the first of the two characters of a register is its low byte.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if `buffer` cannot
+    /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if `buffer` cannot
     /// hold the text. Nothing is copied then.
     pub fn text<'b>(
         &self,
@@ -252,7 +252,7 @@ impl<C: RegisterBytes> Registers<C> {
         while count < length && character(count) != 0 {
             count += 1;
         }
-        let text = buffer.get_mut(..count).ok_or(Error::BUFFER_TOO_SMALL)?;
+        let text = buffer.get_mut(..count).ok_or(Error::BufferTooSmall)?;
         for (place, byte) in text.iter_mut().enumerate() {
             *byte = character(place);
         }
@@ -262,7 +262,7 @@ impl<C: RegisterBytes> Registers<C> {
     /// True if `bytes` equals the raw bytes from the high byte of `address` on.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Error> {
         let start = self.byte_index(address, bytes.len())?;
         let mut held = bytes.iter().enumerate();
@@ -280,7 +280,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Registers::load`] reads them.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    /// [`Error::IllegalDataAddress`]; nothing is set then.
     pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter().enumerate() {
@@ -293,7 +293,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Registers::order`].
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    /// [`Error::IllegalDataAddress`]; nothing is set then.
     pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Error> {
         self.set_in(self.order, address, value)
     }
@@ -301,7 +301,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set`], in another order.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    /// [`Error::IllegalDataAddress`]; nothing is set then.
     pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Error> {
         let bytes = value.to_bytes();
         let mask = order.mask(bytes.as_ref().len());
@@ -312,7 +312,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// number of bytes is odd, the low byte of the last register does not change.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    /// [`Error::IllegalDataAddress`]; nothing is set then.
     pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, 0, bytes)
     }
@@ -320,7 +320,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set_bytes`], in the order in which [`Registers::bytes_in`] reads them.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; nothing is set then.
+    /// [`Error::IllegalDataAddress`]; nothing is set then.
     pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, order.swaps_bytes().into(), bytes)
     }
@@ -328,7 +328,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// Sets the high or the low byte of a register; the other byte does not change.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         self.cells.set_byte(place, value);
@@ -338,7 +338,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// As [`Registers::set_u8`], signed.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]
+    /// [`Error::IllegalDataAddress`]
     pub fn set_i8(&mut self, address: u16, high: bool, value: i8) -> Result<(), Error> {
         self.set_u8(address, high, value.cast_unsigned())
     }
@@ -347,7 +347,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// bits do not change.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::INVALID_ARGUMENT`] if `bit` is greater
+    /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] if `bit` is greater
     /// than 15.
     pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Error> {
         let (high, mask) = byte_of_bit(bit)?;
@@ -360,7 +360,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// too.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::BUFFER_TOO_SMALL`] if the text is longer
+    /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if the text is longer
     /// than the field. Nothing is set then.
     pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Error> {
         self.set_text_in(self.order, address, length, text)
@@ -379,7 +379,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     ) -> Result<(), Error> {
         let start = self.byte_index(address, length)?;
         if text.len() > length {
-            return Err(Error::BUFFER_TOO_SMALL);
+            return Err(Error::BufferTooSmall);
         }
         let mask = usize::from(order.swaps_bytes());
         for place in 0..length + length % 2 {
@@ -396,7 +396,7 @@ fn byte_of_bit(bit: u8) -> Result<(bool, u8), Error> {
     if bit < 16 {
         Ok((bit >= 8, 1 << (bit % 8)))
     } else {
-        Err(Error::INVALID_ARGUMENT)
+        Err(Error::InvalidArgument)
     }
 }
 

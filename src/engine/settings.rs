@@ -23,11 +23,11 @@ impl<const DEFAULT: u32> MicrosSetting<DEFAULT> {
     /// Sets a timeout in milliseconds, 0 to 1 000 000.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] above 1 000 000. Nothing changes then.
+    /// [`Error::InvalidArgument`] above 1 000 000. Nothing changes then.
     #[inline(always)]
     pub fn set_timeout(&mut self, milliseconds: u32) -> Result<(), Error> {
         let Some(timeout) = time::timeout(milliseconds) else {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         };
         *self = MicrosSetting::new(timeout);
         Ok(())
@@ -36,10 +36,10 @@ impl<const DEFAULT: u32> MicrosSetting<DEFAULT> {
     /// Sets a delay in milliseconds, 0 to 65 535.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] above 65 535. Nothing changes then.
+    /// [`Error::InvalidArgument`] above 65 535. Nothing changes then.
     pub fn set_delay(&mut self, milliseconds: u32) -> Result<(), Error> {
         let Ok(delay) = u16::try_from(milliseconds) else {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         };
         *self = MicrosSetting::new(millis(delay));
         Ok(())
@@ -140,11 +140,11 @@ mod tests {
         let response_timeout = &mut settings.response_timeout;
         assert_eq!(response_timeout.set_timeout(1_000_000), Ok(()));
         let refused = response_timeout.set_timeout(1_000_001);
-        assert_eq!(refused, Err(Error::INVALID_ARGUMENT));
+        assert_eq!(refused, Err(Error::InvalidArgument));
         assert_eq!(response_timeout.get(), 1_000_000_000);
         let quiet_time = &mut settings.quiet_time;
         assert_eq!(quiet_time.set_delay(65_535), Ok(()));
-        assert_eq!(quiet_time.set_delay(65_536), Err(Error::INVALID_ARGUMENT));
+        assert_eq!(quiet_time.set_delay(65_536), Err(Error::InvalidArgument));
         assert_eq!(quiet_time.get(), 65_535_000);
     }
 

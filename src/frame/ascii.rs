@@ -139,20 +139,20 @@ pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
 /// Decodes the frame that fills `bytes`, in place. Digits may be in upper or lower case.
 ///
 /// # Errors
-/// [`Error::INCOMPLETE_FRAME`] if the end is missing; [`Error::MALFORMED_FRAME`] if the colon
-/// is missing, or if the characters are not pairs of digits; [`Error::INVALID_CRC`] if the LRC
+/// [`Error::IncompleteFrame`] if the end is missing; [`Error::MalformedFrame`] if the colon
+/// is missing, or if the characters are not pairs of digits; [`Error::InvalidCrc`] if the LRC
 /// is wrong. After an error, `bytes` may be overwritten.
 pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
     if bytes.first().is_none_or(|first| *first == START)
         && bytes.len() <= MAX_FRAME
         && (bytes.len() < DELIMITERS || !bytes.ends_with(&[CARRIAGE_RETURN, end]))
     {
-        return Err(Error::INCOMPLETE_FRAME);
+        return Err(Error::IncompleteFrame);
     }
     let length = match decode(bytes, end, true) {
         Decoded::Valid(length) => length,
-        Decoded::WrongLrc(_) => return Err(Error::INVALID_CRC),
-        Decoded::Malformed => return Err(Error::MALFORMED_FRAME),
+        Decoded::WrongLrc(_) => return Err(Error::InvalidCrc),
+        Decoded::Malformed => return Err(Error::MalformedFrame),
     };
     match bytes.get(..length.into()) {
         Some([unit, pdu @ ..]) => Ok(Adu {
@@ -160,7 +160,7 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
             unit: *unit,
             pdu,
         }),
-        _ => Err(Error::MALFORMED_FRAME),
+        _ => Err(Error::MalformedFrame),
     }
 }
 
@@ -168,7 +168,7 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BufferTooSmall`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
@@ -176,7 +176,7 @@ pub fn emit(
     pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
 ) -> Result<usize, Error> {
     let Some((first, place)) = buffer.split_first_mut() else {
-        return Err(Error::BUFFER_TOO_SMALL);
+        return Err(Error::BufferTooSmall);
     };
     *first = unit;
     let content = 1 + pdu(place)?;
@@ -187,11 +187,11 @@ pub fn emit(
 /// length of the frame.
 ///
 /// # Errors
-/// [`Error::BUFFER_TOO_SMALL`]; `buffer` is then unchanged.
+/// [`Error::BufferTooSmall`]; `buffer` is then unchanged.
 pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Error> {
     let total = 2 * (content + 1) + DELIMITERS;
     let Some(frame) = buffer.get_mut(..total) else {
-        return Err(Error::BUFFER_TOO_SMALL);
+        return Err(Error::BufferTooSmall);
     };
     let check = lrc(frame.get(..content).unwrap_or_default());
     // From the last byte to the first, so that no byte is overwritten before it is encoded.
@@ -234,7 +234,7 @@ mod tests {
         assert_eq!((length, &buffer[..]), (Ok(9), FRAME));
         assert_eq!(
             emit(&mut buffer[..8], 2, END, |_| Ok(1)),
-            Err(Error::BUFFER_TOO_SMALL)
+            Err(Error::BufferTooSmall)
         );
     }
 
@@ -247,11 +247,11 @@ mod tests {
     fn a_frame_without_its_end_is_incomplete() {
         for end in 0..FRAME.len() {
             let mut bytes = FRAME[..end].to_vec();
-            assert_eq!(parse(&mut bytes, END), Err(Error::INCOMPLETE_FRAME));
+            assert_eq!(parse(&mut bytes, END), Err(Error::IncompleteFrame));
         }
         assert_eq!(
             parse(&mut FRAME.to_vec(), b'!'),
-            Err(Error::INCOMPLETE_FRAME)
+            Err(Error::IncompleteFrame)
         );
     }
 
@@ -264,14 +264,14 @@ mod tests {
             b":07\r\n",
         ] {
             let mut bytes = frame.to_vec();
-            assert_eq!(parse(&mut bytes, END), Err(Error::MALFORMED_FRAME));
+            assert_eq!(parse(&mut bytes, END), Err(Error::MalformedFrame));
         }
     }
 
     #[test]
     fn a_wrong_lrc_is_detected() {
         let mut bytes = b":0207F6\r\n".to_vec();
-        assert_eq!(parse(&mut bytes, END), Err(Error::INVALID_CRC));
+        assert_eq!(parse(&mut bytes, END), Err(Error::InvalidCrc));
     }
 
     #[test]

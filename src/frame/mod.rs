@@ -53,7 +53,7 @@ impl Framing {
     /// it; `end` is its end character. Other framings ignore `end`.
     ///
     /// # Errors
-    /// [`Error::INCOMPLETE_FRAME`]; [`Error::MALFORMED_FRAME`]; [`Error::INVALID_CRC`] if the
+    /// [`Error::IncompleteFrame`]; [`Error::MalformedFrame`]; [`Error::InvalidCrc`] if the
     /// CRC or the LRC is wrong.
     pub fn parse(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
         match self {
@@ -68,7 +68,7 @@ impl Framing {
     /// `transaction`, only ASCII uses `end`.
     ///
     /// # Errors
-    /// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
+    /// The error of `pdu`; [`Error::BufferTooSmall`].
     pub fn emit(
         self,
         buffer: &mut [u8],

@@ -52,14 +52,14 @@ pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [
 /// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// [`Error::INCOMPLETE_FRAME`] for fewer bytes than the shortest frame has,
-/// [`Error::MALFORMED_FRAME`] for more than the longest has; [`Error::INVALID_CRC`].
+/// [`Error::IncompleteFrame`] for fewer bytes than the shortest frame has,
+/// [`Error::MalformedFrame`] for more than the longest has; [`Error::InvalidCrc`].
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
     if bytes.len() < usize::from(MIN_FRAME) {
-        return Err(Error::INCOMPLETE_FRAME);
+        return Err(Error::IncompleteFrame);
     }
     if bytes.len() > MAX_FRAME {
-        return Err(Error::MALFORMED_FRAME);
+        return Err(Error::MalformedFrame);
     }
     match bytes {
         [unit, pdu @ .., _, _] if is_frame(bytes) => Ok(Adu {
@@ -67,7 +67,7 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
             unit: *unit,
             pdu,
         }),
-        _ => Err(Error::INVALID_CRC),
+        _ => Err(Error::InvalidCrc),
     }
 }
 
@@ -120,7 +120,7 @@ pub fn find_last(bytes: &[u8]) -> usize {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BufferTooSmall`].
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,
@@ -128,10 +128,10 @@ pub fn emit(
 ) -> Result<usize, Error> {
     let space = buffer.len().saturating_sub(OVERHEAD);
     let place = buffer.get_mut(PDU..PDU + space);
-    let length = pdu(place.ok_or(Error::BUFFER_TOO_SMALL)?)?;
+    let length = pdu(place.ok_or(Error::BufferTooSmall)?)?;
     // This check also lets the compiler prove that the frame's length does not overflow.
     if length > space {
-        return Err(Error::BUFFER_TOO_SMALL);
+        return Err(Error::BufferTooSmall);
     }
     write(buffer, unit, length, |_| ());
     Ok(length + OVERHEAD)

@@ -31,15 +31,15 @@ pub struct Header {
 /// checked as soon as they are complete, even if the rest of the header is still missing.
 ///
 /// # Errors
-/// [`Error::INCOMPLETE_FRAME`] if bytes of the header are missing;
-/// [`Error::MALFORMED_FRAME`] if the bytes cannot begin a Modbus TCP frame.
+/// [`Error::IncompleteFrame`] if bytes of the header are missing;
+/// [`Error::MalformedFrame`] if the bytes cannot begin a Modbus TCP frame.
 pub fn header(bytes: &[u8]) -> Result<Header, Error> {
     let Some([a, b, c, d, e, f, unit]) = bytes.first_chunk() else {
         return Err(partial_header_error(bytes));
     };
     let length = u16::from_be_bytes([*e, *f]);
     if u16::from_ne_bytes([*c, *d]) != 0 || !VALID_LENGTHS.contains(&length) {
-        return Err(Error::MALFORMED_FRAME);
+        return Err(Error::MalformedFrame);
     }
     Ok(Header {
         transaction: u16::from_be_bytes([*a, *b]),
@@ -71,17 +71,17 @@ fn partial_header_error(bytes: &[u8]) -> Error {
         _ => true,
     };
     if is_valid_so_far {
-        Error::INCOMPLETE_FRAME
+        Error::IncompleteFrame
     } else {
-        Error::MALFORMED_FRAME
+        Error::MalformedFrame
     }
 }
 
 /// Parses the frame that fills `bytes`.
 ///
 /// # Errors
-/// As [`header`]; [`Error::INCOMPLETE_FRAME`] also if bytes of the PDU are missing;
-/// [`Error::MALFORMED_FRAME`] also if bytes follow the frame.
+/// As [`header`]; [`Error::IncompleteFrame`] also if bytes of the PDU are missing;
+/// [`Error::MalformedFrame`] also if bytes follow the frame.
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
     let Some(([a, b, protocol_and_length @ .., unit], pdu)) = bytes.split_first_chunk::<PDU>()
     else {
@@ -103,8 +103,8 @@ pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
 #[cold]
 fn parse_error(bytes: &[u8]) -> Error {
     match header(bytes) {
-        Ok(header) if bytes.len() > header.total => Error::MALFORMED_FRAME,
-        Ok(_) => Error::INCOMPLETE_FRAME,
+        Ok(header) if bytes.len() > header.total => Error::MalformedFrame,
+        Ok(_) => Error::IncompleteFrame,
         Err(error) => error,
     }
 }
@@ -113,7 +113,7 @@ fn parse_error(bytes: &[u8]) -> Error {
 /// front of the slice that it gets, and returns the length of the PDU.
 ///
 /// # Errors
-/// The error of `pdu`; [`Error::BUFFER_TOO_SMALL`].
+/// The error of `pdu`; [`Error::BufferTooSmall`].
 pub fn emit(
     buffer: &mut [u8],
     transaction: u16,
@@ -121,7 +121,7 @@ pub fn emit(
     pdu: impl FnOnce(&mut [u8]) -> Result<usize, Error>,
 ) -> Result<usize, Error> {
     let Some((header, place)) = buffer.split_first_chunk_mut::<PDU>() else {
-        return Err(Error::BUFFER_TOO_SMALL);
+        return Err(Error::BufferTooSmall);
     };
     let length = pdu(place)?;
     *header = emit_header(transaction, length, unit);
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_part_of_a_frame_is_incomplete() {
         for end in 0..FRAME.len() {
-            assert_eq!(parse(&FRAME[..end]), Err(Error::INCOMPLETE_FRAME));
+            assert_eq!(parse(&FRAME[..end]), Err(Error::IncompleteFrame));
         }
     }
 
@@ -165,13 +165,13 @@ mod tests {
         for length in [0u16, 1, 255, 256, 65535] {
             let [high, low] = length.to_be_bytes();
             let bytes = [0, 1, 0, 0, high, low, 1, 3, 0, 0, 0, 1];
-            assert_eq!(header(&bytes), Err(Error::MALFORMED_FRAME), "{length}");
+            assert_eq!(header(&bytes), Err(Error::MalformedFrame), "{length}");
         }
         assert_eq!(header(&[0, 1, 0, 0, 0, 254, 1]).unwrap().total, MAX_FRAME);
     }
 
     #[test]
     fn another_protocol_is_malformed() {
-        assert_eq!(header(&[0, 1, 0, 1]), Err(Error::MALFORMED_FRAME));
+        assert_eq!(header(&[0, 1, 0, 1]), Err(Error::MalformedFrame));
     }
 }

@@ -86,7 +86,7 @@ impl<S: GatewayStorage> Gateway<S> {
                 self.storage.connection_mut(connection).receiving = NONE;
                 self.route(connection, request, header.unit);
             }
-            Err(Error::MALFORMED_FRAME) => self.lose(connection, Status::MALFORMED_FRAME),
+            Err(Error::MalformedFrame) => self.lose(connection, Status::MALFORMED_FRAME),
             _ => {}
         }
     }

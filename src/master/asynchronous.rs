@@ -45,7 +45,7 @@ impl<C: FnMut() -> u32, E: FnMut(bool)> Port for Bridge<C, E> {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
         let received = self.received.get(self.start..self.end).unwrap_or_default();
         if received.is_empty() && self.is_lost {
-            return Err(Error::LINK_LOST);
+            return Err(Error::LinkLost);
         }
         let mut count = 0;
         for (place, byte) in bytes.iter_mut().zip(received) {
@@ -282,11 +282,11 @@ where
     ///
     /// # Errors
     /// This and the other functions return an exception of the device, for example
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]; [`Error::RESPONSE_TIMED_OUT`], [`Error::INVALID_CRC`],
-    /// [`Error::LINK_LOST`] or another error of the line. They send nothing if the standard
-    /// does not allow the quantity or the addresses ([`Error::ILLEGAL_DATA_VALUE`],
-    /// [`Error::ILLEGAL_DATA_ADDRESS`]), or if the buffers cannot hold the data
-    /// ([`Error::BUFFER_TOO_SMALL`], [`Error::ILLEGAL_DATA_VALUE`]).
+    /// [`Error::IllegalDataAddress`]; [`Error::ResponseTimedOut`], [`Error::InvalidCrc`],
+    /// [`Error::LinkLost`] or another error of the line. They send nothing if the standard
+    /// does not allow the quantity or the addresses ([`Error::InvalidQuantity`],
+    /// [`Error::InvalidAddress`]), or if the buffers cannot hold the data
+    /// ([`Error::BufferTooSmall`], [`Error::InvalidQuantity`]).
     pub async fn read_coils(&mut self, address: u16, coils: &mut [bool]) -> Result<(), Error> {
         let quantity = super::quantity(coils.len());
         self.request(|master| master.read_coils(address, quantity))

@@ -210,18 +210,18 @@ impl<P: Port, S: Words> Master<P, S> {
         };
         match status {
             Status::PENDING => Ok(()),
-            refused => refused.result(),
+            refused => Err(Error::refused(refused)),
         }
     }
 
     /// 01: reads 1 to 2000 coils into the response words.
     ///
     /// # Errors
-    /// Nothing is sent then: [`Error::BUSY`] while a request is pending;
-    /// [`Error::ILLEGAL_DATA_VALUE`] for a quantity that the standard or the buffers do not
-    /// allow; [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond 65535;
-    /// [`Error::BUFFER_TOO_SMALL`]; [`Error::BROADCAST_NOT_ALLOWED`];
-    /// [`Error::NOT_INITIALISED`] if the port or the frame buffer cannot be used.
+    /// Nothing is sent then: [`Error::Busy`] while a request is pending;
+    /// [`Error::InvalidQuantity`] for a quantity that the standard or the buffers do not
+    /// allow; [`Error::InvalidAddress`] for addresses beyond 65535;
+    /// [`Error::BufferTooSmall`]; [`Error::BroadcastNotAllowed`];
+    /// [`Error::NotInitialised`] if the port or the frame buffer cannot be used.
     pub fn read_coils(&mut self, address: u16, quantity: u16) -> Result<(), Error> {
         self.start(request!(READ_COILS, address, quantity))
     }

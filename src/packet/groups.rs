@@ -47,8 +47,8 @@ pub fn record(side: PduKind, function: u8, groups: &[u8]) -> Option<(Record, &[u
 /// bytes.
 ///
 /// # Errors
-/// [`Error::ILLEGAL_FUNCTION`] for functions other than 14 and 15;
-/// [`Error::BUFFER_TOO_SMALL`]; the error of a request or response that contains only this
+/// [`Error::IllegalFunction`] for functions other than 14 and 15;
+/// [`Error::BufferTooSmall`]; the error of a request or response that contains only this
 /// record.
 pub fn put_record(
     side: PduKind,
@@ -60,7 +60,7 @@ pub fn put_record(
     let mut writer = Writer::new(place);
     let is_read = function == READ_FILE_RECORD;
     if !is_read && function != WRITE_FILE_RECORD {
-        return Err(Error::ILLEGAL_FUNCTION);
+        return Err(Error::IllegalFunction);
     }
     if is_read && side == PduKind::Response {
         // A count that does not fit a byte is refused below, when the group is read.
@@ -95,11 +95,11 @@ pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
 /// bytes.
 ///
 /// # Errors
-/// [`Error::ILLEGAL_DATA_VALUE`] if the value is longer than 255 bytes;
-/// [`Error::BUFFER_TOO_SMALL`].
+/// [`Error::IllegalDataValue`] if the value is longer than 255 bytes;
+/// [`Error::BufferTooSmall`].
 pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Error> {
     if value.len() > 0xFF {
-        return Err(Error::ILLEGAL_DATA_VALUE);
+        return Err(Error::IllegalDataValue);
     }
     let mut writer = Writer::new(place);
     writer.u8(id);
@@ -138,7 +138,7 @@ mod tests {
             let found = record(side, function, &bytes[..length]);
             assert_eq!(found, Some((head, data, length)));
             let short = put_record(side, function, head, data, &mut bytes[..length - 1]);
-            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BufferTooSmall));
         }
     }
 
@@ -156,49 +156,49 @@ mod tests {
                 0x14,
                 head(0, 1),
                 0,
-                Error::ILLEGAL_DATA_ADDRESS,
+                Error::IllegalDataAddress,
             ),
             (
                 PduKind::Request,
                 0x14,
                 head(1, 0),
                 0,
-                Error::ILLEGAL_DATA_VALUE,
+                Error::IllegalDataValue,
             ),
             (
                 PduKind::Request,
                 0x15,
                 head(1, 2),
                 2,
-                Error::ILLEGAL_DATA_VALUE,
+                Error::IllegalDataValue,
             ),
             (
                 PduKind::Request,
                 0x15,
                 head(1, 250),
                 500,
-                Error::ILLEGAL_DATA_VALUE,
+                Error::IllegalDataValue,
             ),
             (
                 PduKind::Response,
                 0x14,
                 NO_RECORD,
                 3,
-                Error::ILLEGAL_DATA_VALUE,
+                Error::IllegalDataValue,
             ),
             (
                 PduKind::Response,
                 0x14,
                 NO_RECORD,
                 510,
-                Error::ILLEGAL_DATA_VALUE,
+                Error::IllegalDataValue,
             ),
             (
                 PduKind::Request,
                 0x18,
                 head(1, 1),
                 0,
-                Error::ILLEGAL_FUNCTION,
+                Error::IllegalFunction,
             ),
         ] {
             let found = put_record(side, function, head, &[0; 510][..count], &mut bytes);
@@ -213,6 +213,6 @@ mod tests {
         assert_eq!(object(&bytes), Some((1, &b"mbm"[..], 5)));
         assert_eq!(object(&bytes[..4]), None);
         let short = put_object(1, b"mbms", &mut bytes);
-        assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
+        assert_eq!(short, Err(Error::BufferTooSmall));
     }
 }

@@ -44,7 +44,7 @@ fn may_be_longer(side: PduKind, pdu: &[u8]) -> bool {
 /// means that the end character ends it. `end` is the last character of an ASCII frame.
 ///
 /// # Errors
-/// [`Error::MALFORMED_FRAME`] if no frame of this framing begins with these bytes, or if the
+/// [`Error::MalformedFrame`] if no frame of this framing begins with these bytes, or if the
 /// frame would be too long for this framing.
 pub fn expected(
     framing: Framing,
@@ -56,7 +56,7 @@ pub fn expected(
     let length = match framing {
         Framing::Tcp => match tcp::header(bytes) {
             Ok(header) => Length::Exactly(header.total),
-            Err(Error::INCOMPLETE_FRAME) => Length::AtLeast(frame_bytes(framing, 1)),
+            Err(Error::IncompleteFrame) => Length::AtLeast(frame_bytes(framing, 1)),
             Err(refused) => return Err(refused),
         },
         Framing::Ascii => expected_ascii(side, bytes, end, functions)?,
@@ -74,7 +74,7 @@ pub fn expected(
     };
     match length {
         Length::Exactly(length) | Length::AtLeast(length) if length > framing.max_frame() => {
-            Err(Error::MALFORMED_FRAME)
+            Err(Error::MalformedFrame)
         }
         length => Ok(length),
     }
@@ -103,7 +103,7 @@ fn expected_ascii(
         return Ok(Length::AtLeast(frame_bytes(framing, 1)));
     };
     if *first != ascii::START {
-        return Err(Error::MALFORMED_FRAME);
+        return Err(Error::MalformedFrame);
     }
     let is_end = |pair: &[u8]| match pair {
         [before, last] => ascii::kind_of(*before, *last, end) == ascii::CharacterKind::End,
@@ -119,7 +119,7 @@ fn expected_ascii(
     let mut pairs = digits.chunks_exact(2);
     let mut count = 0;
     for (place, pair) in content.iter_mut().zip(pairs.by_ref()) {
-        *place = ascii::byte(pair).ok_or(Error::MALFORMED_FRAME)?;
+        *place = ascii::byte(pair).ok_or(Error::MalformedFrame)?;
         count += 1;
     }
     let rest_is_digits = pairs
@@ -127,7 +127,7 @@ fn expected_ascii(
         .iter()
         .all(|last| ascii::digit(*last).is_some());
     if !rest_is_digits || pairs.next().is_some() {
-        return Err(Error::MALFORMED_FRAME);
+        return Err(Error::MalformedFrame);
     }
     let pdu = content.get(1..count).unwrap_or_default();
     match frame_length(framing, side.length(pdu, functions)) {
@@ -135,7 +135,7 @@ fn expected_ascii(
             (true, false) => Ok(Length::Exactly(length)),
             (true, true) => Ok(Length::AtLeast(length)),
             // The frame has its full length, but no end characters.
-            (false, false) => Err(Error::MALFORMED_FRAME),
+            (false, false) => Err(Error::MalformedFrame),
             (false, true) => Ok(Length::Silence),
         },
         length => Ok(length),
@@ -161,15 +161,15 @@ pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Func
 /// leaves to users, or one in `functions`. Function 0 is always refused.
 ///
 /// # Errors
-/// [`Error::INCOMPLETE_FRAME`] if header and function code are not complete;
-/// [`Error::MALFORMED_FRAME`] if no such frame begins with these bytes.
+/// [`Error::IncompleteFrame`] if header and function code are not complete;
+/// [`Error::MalformedFrame`] if no such frame begins with these bytes.
 pub fn looks_like_tcp(
     bytes: &[u8],
     allow_unknown: bool,
     functions: &[Function],
 ) -> Result<usize, Error> {
     let header = tcp::header(bytes)?;
-    let code = *bytes.get(tcp::PDU).ok_or(Error::INCOMPLETE_FRAME)?;
+    let code = *bytes.get(tcp::PDU).ok_or(Error::IncompleteFrame)?;
     let function = code & !EXCEPTION;
     let known =
         is_user_defined(function) || response_length(&[function], functions) != Length::Unknown;
@@ -186,7 +186,7 @@ pub fn looks_like_tcp(
     if function != 0 && (known || allow_unknown) && right {
         Ok(header.total)
     } else {
-        Err(Error::MALFORMED_FRAME)
+        Err(Error::MalformedFrame)
     }
 }
 
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(unknown, Ok(Length::Silence));
         for bad in [&b"x"[..], b":1G", b":\r1", b":0207F777", b":0207F7\rX"] {
             let length = expected_length(Framing::Ascii, PduKind::Request, bad);
-            assert_eq!(length, Err(Error::MALFORMED_FRAME));
+            assert_eq!(length, Err(Error::MalformedFrame));
         }
     }
 
@@ -257,11 +257,11 @@ mod tests {
     #[test]
     fn lengths_that_no_frame_has_are_malformed() {
         let length = expected_length(Framing::Rtu, PduKind::Response, &[1, 3, 252]);
-        assert_eq!(length, Err(Error::MALFORMED_FRAME));
+        assert_eq!(length, Err(Error::MalformedFrame));
         let length = expected_length(Framing::Tcp, PduKind::Request, &[0, 1, 0, 0, 255, 255]);
-        assert_eq!(length, Err(Error::MALFORMED_FRAME));
+        assert_eq!(length, Err(Error::MalformedFrame));
         let length = expected_length(Framing::Ascii, PduKind::Response, b":0103FF");
-        assert_eq!(length, Err(Error::MALFORMED_FRAME));
+        assert_eq!(length, Err(Error::MalformedFrame));
     }
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
         let mut bytes = [0x81, 0x80, 0, 0, 0, 6, 0x10, 1, 0, 0x6B, 0, 3];
         for have in 0..8 {
             let length = looks_like_tcp(&bytes[..have], true, &[]);
-            assert_eq!(length, Err(Error::INCOMPLETE_FRAME));
+            assert_eq!(length, Err(Error::IncompleteFrame));
         }
         assert_eq!(looks_like_tcp(&bytes[..8], false, &[]), Ok(12));
         for (function, length, known) in [
@@ -320,7 +320,7 @@ mod tests {
         for function in [0, 0x80] {
             bytes[7] = function;
             let length = looks_like_tcp(&bytes, true, &[]);
-            assert_eq!(length, Err(Error::MALFORMED_FRAME));
+            assert_eq!(length, Err(Error::MalformedFrame));
         }
     }
 }

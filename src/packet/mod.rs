@@ -82,13 +82,13 @@ mod tests {
             let request = Request::Custom { function, data };
             assert_eq!(emit_request(&request, &own, &mut place).is_ok(), taken);
             let undeclared = emit_request(&request, &[], &mut place);
-            assert_eq!(undeclared, Err(Error::ILLEGAL_FUNCTION));
+            assert_eq!(undeclared, Err(Error::IllegalFunction));
         }
         for (data, taken) in [(&[1, 2][..], true), (&[2, 2], false), (&[], false)] {
             let response = Response::Custom { function, data };
             assert_eq!(emit_response(&response, &own, &mut place).is_ok(), taken);
             let undeclared = emit_response(&response, &[], &mut place);
-            assert_eq!(undeclared, Err(Error::INVALID_FUNCTION));
+            assert_eq!(undeclared, Err(Error::InvalidFunction));
         }
     }
 }

@@ -30,17 +30,17 @@ impl Exception {
     /// The exception that answers a request with this head.
     ///
     /// # Errors
-    /// [`Error::BROADCAST_NOT_ALLOWED`] for a broadcast, which is never answered;
-    /// [`Error::INVALID_ARGUMENT`] if `status` is no exception code;
-    /// [`Error::ILLEGAL_FUNCTION`] for a function code from 0x80 on, which an exception
+    /// [`Error::BroadcastNotAllowed`] for a broadcast, which is never answered;
+    /// [`Error::InvalidArgument`] if `status` is no exception code;
+    /// [`Error::IllegalFunction`] for a function code from 0x80 on, which an exception
     /// cannot contain.
     pub const fn new(framing: Framing, head: Head, status: Status) -> Result<Self, Error> {
         if !status.is_exception() {
-            Err(Error::INVALID_ARGUMENT)
+            Err(Error::InvalidArgument)
         } else if framing.is_serial() && head.unit == 0 {
-            Err(Error::BROADCAST_NOT_ALLOWED)
+            Err(Error::BroadcastNotAllowed)
         } else if head.function & EXCEPTION != 0 {
-            Err(Error::ILLEGAL_FUNCTION)
+            Err(Error::IllegalFunction)
         } else {
             Ok(Exception {
                 head,
@@ -53,7 +53,7 @@ impl Exception {
     /// ASCII frame.
     ///
     /// # Errors
-    /// [`Error::BUFFER_TOO_SMALL`].
+    /// [`Error::BufferTooSmall`].
     pub fn emit(&self, framing: Framing, end: u8, buffer: &mut [u8]) -> Result<usize, Error> {
         let response = Response::Exception {
             function: self.head.function,

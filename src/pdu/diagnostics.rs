@@ -48,7 +48,7 @@ const fn is_known(sub_function: u16) -> bool {
 /// Checks a sub-function and its data: one word, or any number of words for Return Query Data.
 pub(super) fn check_sub_function(sub_function: u16, data: &[u8]) -> Result<(), Error> {
     if !is_known(sub_function) {
-        return Err(Error::ILLEGAL_FUNCTION);
+        return Err(Error::IllegalFunction);
     }
     let any = sub_function == sub_function::RETURN_QUERY_DATA;
     expect(!data.is_empty() && data.len().is_multiple_of(2) && (any || data.len() == 2))

@@ -232,24 +232,24 @@ pub(super) fn expect(is_right: bool) -> Result<(), Error> {
     if is_right {
         Ok(())
     } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
+        Err(Error::IllegalDataValue)
     }
 }
 
 /// Reads a byte; an error if the PDU has ended.
 pub(super) fn byte(reader: &mut Reader) -> Result<u8, Error> {
-    reader.u8().ok_or(Error::ILLEGAL_DATA_VALUE)
+    reader.u8().ok_or(Error::IllegalDataValue)
 }
 
 /// Reads a word; an error if the PDU has ended.
 pub(super) fn word(reader: &mut Reader) -> Result<u16, Error> {
-    reader.u16().ok_or(Error::ILLEGAL_DATA_VALUE)
+    reader.u16().ok_or(Error::IllegalDataValue)
 }
 
 /// Reads a byte count and as many bytes of data.
 pub(super) fn counted<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
     let count = usize::from(byte(reader)?);
-    reader.take(count).ok_or(Error::ILLEGAL_DATA_VALUE)
+    reader.take(count).ok_or(Error::IllegalDataValue)
 }
 
 /// Checks that `count` is within `limits`, the least and the greatest value.

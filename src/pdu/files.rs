@@ -44,7 +44,7 @@ fn next_record(reader: &mut Reader) -> Result<(Record, bool), Error> {
         length: word(reader)?,
     };
     if record.length == 0 {
-        return Err(Error::ILLEGAL_DATA_VALUE);
+        return Err(Error::IllegalDataValue);
     }
     let last = record.record.checked_add(record.length - 1);
     let exists = reference == REFERENCE_TYPE
@@ -58,7 +58,7 @@ fn check_exist(exist: bool) -> Result<(), Error> {
     if exist {
         Ok(())
     } else {
-        Err(Error::ILLEGAL_DATA_ADDRESS)
+        Err(Error::IllegalDataAddress)
     }
 }
 
@@ -66,8 +66,8 @@ impl<'a> Reads<'a> {
     /// The sub-requests in `bytes`.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_VALUE`] for wrong counts, or for more records than one response
-    /// can hold; [`Error::ILLEGAL_DATA_ADDRESS`] for a reference type, file number or record
+    /// [`Error::IllegalDataValue`] for wrong counts, or for more records than one response
+    /// can hold; [`Error::IllegalDataAddress`] for a reference type, file number or record
     /// number that the standard does not allow.
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         check_within(bytes.len(), READ_FILE_BYTES)?;
@@ -77,7 +77,7 @@ impl<'a> Reads<'a> {
         while !reader.is_empty() {
             let (record, exists) = next_record(&mut reader)?;
             let answer = sub_response_length(record.length);
-            space = space.checked_sub(answer).ok_or(Error::ILLEGAL_DATA_VALUE)?;
+            space = space.checked_sub(answer).ok_or(Error::IllegalDataValue)?;
             exist &= exists;
         }
         check_exist(exist)?;
@@ -111,7 +111,7 @@ fn sub_response_length(records: u16) -> usize {
 fn next_write<'a>(reader: &mut Reader<'a>) -> Result<(Record, &'a [u8], bool), Error> {
     let (record, exists) = next_record(reader)?;
     let data = reader.take(usize::from(record.length).saturating_mul(2));
-    Ok((record, data.ok_or(Error::ILLEGAL_DATA_VALUE)?, exists))
+    Ok((record, data.ok_or(Error::IllegalDataValue)?, exists))
 }
 
 impl<'a> Writes<'a> {
@@ -152,7 +152,7 @@ fn next_data<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8], Error> {
         Some((&REFERENCE_TYPE, data)) if !data.is_empty() && data.len().is_multiple_of(2) => {
             Ok(data)
         }
-        _ => Err(Error::ILLEGAL_DATA_VALUE),
+        _ => Err(Error::IllegalDataValue),
     }
 }
 
@@ -160,7 +160,7 @@ impl<'a> Records<'a> {
     /// The sub-responses in `bytes`.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_VALUE`] for wrong counts.
+    /// [`Error::IllegalDataValue`] for wrong counts.
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         // The sub-response of one record has four bytes, although the least byte count in
         // the standard's table is seven.

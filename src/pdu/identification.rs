@@ -38,10 +38,10 @@ impl<'a> IdentificationReply<'a> {
     /// stores.
     ///
     /// # Errors
-    /// [`Error::MALFORMED_REPLY`] if they are not well-formed, for example if an object is
+    /// [`Error::MalformedReply`] if they are not well-formed, for example if an object is
     /// cut off.
     pub fn parse(code: u8, bytes: &'a [u8]) -> Result<Self, Error> {
-        read_reply(code, &mut Reader::new(bytes)).map_err(|_| Error::MALFORMED_REPLY)
+        read_reply(code, &mut Reader::new(bytes)).map_err(|_| Error::MalformedReply)
     }
 }
 
@@ -88,7 +88,7 @@ impl<'a> ObjectList<'a> {
     /// The `count` objects in `bytes`.
     ///
     /// # Errors
-    /// [`Error::ILLEGAL_DATA_VALUE`] unless `bytes` are exactly `count` objects.
+    /// [`Error::IllegalDataValue`] unless `bytes` are exactly `count` objects.
     pub fn new(count: u8, bytes: &'a [u8]) -> Result<Self, Error> {
         let mut reader = Reader::new(bytes);
         for _ in 0..count {
@@ -97,7 +97,7 @@ impl<'a> ObjectList<'a> {
         if reader.is_empty() {
             Ok(ObjectList { count, bytes })
         } else {
-            Err(Error::ILLEGAL_DATA_VALUE)
+            Err(Error::IllegalDataValue)
         }
     }
 

@@ -50,18 +50,18 @@ impl ObjectStream {
     /// requested object: a device that does not have that object begins with the first one.
     ///
     /// # Errors
-    /// [`Error::MALFORMED_REPLY`] if a request for one object was answered with another.
-    /// [`Error::NO_PROGRESS`] if a later reply has an object before the one that the device
+    /// [`Error::MalformedReply`] if a request for one object was answered with another.
+    /// [`Error::NoProgress`] if a later reply has an object before the one that the device
     /// itself named. On an error nothing changes.
     pub fn take(&mut self, reply: &IdentificationReply) -> Result<Next, Error> {
         let mut least = self.least;
         for (id, _) in reply.objects.iter() {
             if self.code == INDIVIDUAL && id != self.requested {
-                return Err(Error::MALFORMED_REPLY);
+                return Err(Error::MalformedReply);
             }
             let id = u16::from(id);
             if id < self.least {
-                return Err(Error::NO_PROGRESS);
+                return Err(Error::NoProgress);
             }
             least = least.max(id + 1);
         }

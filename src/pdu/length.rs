@@ -120,10 +120,10 @@ pub(crate) fn objects(pdu: &[u8]) -> Length {
 /// must be one that the standard leaves to users, and any length is right.
 pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), Error> {
     if !is_free(function) {
-        return Err(Error::ILLEGAL_FUNCTION);
+        return Err(Error::IllegalFunction);
     }
     let has_right_length = match rule.map(|rule| by_rule(pdu, rule)) {
-        None if !is_user_defined(function) => return Err(Error::ILLEGAL_FUNCTION),
+        None if !is_user_defined(function) => return Err(Error::IllegalFunction),
         None | Some(Length::Silence) => true,
         Some(Length::Exactly(length)) => length == pdu.len(),
         Some(_) => false,
@@ -131,6 +131,6 @@ pub(super) fn check(pdu: &[u8], function: u8, rule: Option<Rule>) -> Result<(), 
     if has_right_length {
         Ok(())
     } else {
-        Err(Error::ILLEGAL_DATA_VALUE)
+        Err(Error::IllegalDataValue)
     }
 }

@@ -96,9 +96,9 @@ impl<'a> Request<'a> {
     /// Parses a request PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
-    /// The exception that a server answers: [`Error::ILLEGAL_FUNCTION`] for
-    /// an unknown function or sub-function, [`Error::ILLEGAL_DATA_VALUE`] for
-    /// a wrong length, quantity or value, [`Error::ILLEGAL_DATA_ADDRESS`] for addresses beyond
+    /// The exception that a server answers: [`Error::IllegalFunction`] for
+    /// an unknown function or sub-function, [`Error::IllegalDataValue`] for
+    /// a wrong length, quantity or value, [`Error::IllegalDataAddress`] for addresses beyond
     /// 65535.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Error> {
         Request::parse_with(pdu, &[])
@@ -110,7 +110,7 @@ impl<'a> Request<'a> {
     /// # Errors
     /// As [`Request::parse`].
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
-        let (&function, fields) = pdu.split_first().ok_or(Error::ILLEGAL_FUNCTION)?;
+        let (&function, fields) = pdu.split_first().ok_or(Error::IllegalFunction)?;
         let mut parser = Parser {
             reader: Reader::new(fields),
             is_wrong: false,
@@ -404,13 +404,13 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// The error that [`Request::parse`] returns for such a request, so that no malformed
-    /// request is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
+    /// request is sent; [`Error::BufferTooSmall`] if it does not fit.
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
         writer.u8(self.function());
         self.give(&mut writer);
         if writer.length() > MAX_PDU {
-            return Err(Error::ILLEGAL_DATA_VALUE);
+            return Err(Error::IllegalDataValue);
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
@@ -423,7 +423,7 @@ impl<'a> Request<'a> {
         if same {
             Ok(length)
         } else {
-            Err(Error::ILLEGAL_FUNCTION)
+            Err(Error::IllegalFunction)
         }
     }
 

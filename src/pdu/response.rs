@@ -107,7 +107,7 @@ impl<'a> Response<'a> {
     /// Parses a response PDU. The functions 65 to 72 and 100 to 110 are user-defined.
     ///
     /// # Errors
-    /// [`Error::INVALID_FUNCTION`] for an unknown function, [`Error::MALFORMED_REPLY`] for
+    /// [`Error::InvalidFunction`] for an unknown function, [`Error::MalformedReply`] for
     /// all other errors.
     pub fn parse(pdu: &'a [u8]) -> Result<Self, Error> {
         Response::parse_with(pdu, &[])
@@ -119,7 +119,7 @@ impl<'a> Response<'a> {
     /// # Errors
     /// As [`Response::parse`].
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
-        let (&function, fields) = pdu.split_first().ok_or(Error::MALFORMED_REPLY)?;
+        let (&function, fields) = pdu.split_first().ok_or(Error::MalformedReply)?;
         let mut parser = Parser {
             reader: Reader::new(fields),
             is_wrong: false,
@@ -132,8 +132,8 @@ impl<'a> Response<'a> {
         }
         match found {
             Ok(()) if pdu.len() <= MAX_PDU => Ok(response),
-            Err(Error::INVALID_FUNCTION) if pdu.len() <= MAX_PDU => Err(Error::INVALID_FUNCTION),
-            _ => Err(Error::MALFORMED_REPLY),
+            Err(Error::InvalidFunction) if pdu.len() <= MAX_PDU => Err(Error::InvalidFunction),
+            _ => Err(Error::MalformedReply),
         }
     }
 
@@ -141,15 +141,15 @@ impl<'a> Response<'a> {
     /// one that [`Response::emit`] refuses.
     ///
     /// # Errors
-    /// [`Error::MALFORMED_REPLY`] for records of a file or objects that are not valid.
+    /// [`Error::MalformedReply`] for records of a file or objects that are not valid.
     pub fn take(function: u8, source: &mut impl Fields<'a>) -> Result<Self, Error> {
         let mut response = match Response::of(function) {
-            Response::Exception { .. } => return Err(Error::INVALID_FUNCTION),
+            Response::Exception { .. } => return Err(Error::InvalidFunction),
             response => response,
         };
         response.pass(source);
         let checked = response.check_groups();
-        checked.map_or(Err(Error::MALFORMED_REPLY), |()| Ok(response))
+        checked.map_or(Err(Error::MalformedReply), |()| Ok(response))
     }
 
     /// Gives all fields to `sink`, in the order of the wire.
@@ -388,7 +388,7 @@ impl<'a> Response<'a> {
             Response::Custom { function, .. } => {
                 let declared = custom::find(functions, function);
                 match length::check(pdu, function, declared.map(|it| it.response)) {
-                    Err(Error::ILLEGAL_FUNCTION) => Err(Error::INVALID_FUNCTION),
+                    Err(Error::IllegalFunction) => Err(Error::InvalidFunction),
                     checked => checked,
                 }
             }
@@ -425,7 +425,7 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// The error that [`Response::parse`] returns for such a response, so that no malformed
-    /// response is sent; [`Error::BUFFER_TOO_SMALL`] if it does not fit.
+    /// response is sent; [`Error::BufferTooSmall`] if it does not fit.
     pub fn emit(&self, pdu: &mut [u8]) -> Result<usize, Error> {
         let mut writer = Writer::new(pdu);
         writer.u8(match self {
@@ -434,7 +434,7 @@ impl<'a> Response<'a> {
         });
         self.give(&mut writer);
         if writer.length() > MAX_PDU {
-            return Err(Error::MALFORMED_REPLY);
+            return Err(Error::MalformedReply);
         }
         let length = writer.finish()?;
         let written = pdu.get(..length).unwrap_or_default();
@@ -448,7 +448,7 @@ impl<'a> Response<'a> {
         if same {
             Ok(length)
         } else {
-            Err(Error::INVALID_FUNCTION)
+            Err(Error::InvalidFunction)
         }
     }
 }

@@ -32,15 +32,15 @@ pub struct Conversion<'a> {
 /// The power of ten that a field holds.
 ///
 /// # Errors
-/// [`Error::NOT_AVAILABLE`] if the number is not -10 to 10, as the one with which a device says
-/// that it has none; [`Error::INVALID_ARGUMENT`] if the field has no integer.
+/// [`Error::NotAvailable`] if the number is not -10 to 10, as the one with which a device says
+/// that it has none; [`Error::InvalidArgument`] if the field has no integer.
 pub fn power(words: &Words) -> Result<i8, Error> {
     if !words.field.is_integer() {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     let (magnitude, is_below) = words.magnitude();
     if magnitude > GREATEST_POWER.into() {
-        return Err(Error::NOT_AVAILABLE);
+        return Err(Error::NotAvailable);
     }
     let power = magnitude as i8;
     Ok(if is_below { -power } else { power })
@@ -62,12 +62,12 @@ fn reserved(field: &Field) -> u64 {
 }
 
 impl Words<'_> {
-    /// Whether the value is available: [`Ok`], or [`Error::NOT_AVAILABLE`]. A float that is not a
+    /// Whether the value is available: [`Ok`], or [`Error::NotAvailable`]. A float that is not a
     /// number never is. Of a text, and of registers as they are, only `is_standard` counts: it
     /// is not available if all its registers are 0.
     ///
     /// # Errors
-    /// [`Error::NOT_AVAILABLE`]
+    /// [`Error::NotAvailable`]
     pub fn available(&self, conversion: &Conversion) -> Result<(), Error> {
         let field = self.field;
         let is_lacking = if field.value_type >= TEXT {
@@ -85,7 +85,7 @@ impl Words<'_> {
             }
         };
         if is_lacking {
-            Err(Error::NOT_AVAILABLE)
+            Err(Error::NotAvailable)
         } else {
             Ok(())
         }
@@ -95,12 +95,12 @@ impl Words<'_> {
     /// [`Words::number`].
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a text or for registers as they are, and for an offset
-    /// with too many decimals; [`Error::NOT_AVAILABLE`].
+    /// [`Error::InvalidArgument`] for a text or for registers as they are, and for an offset
+    /// with too many decimals; [`Error::NotAvailable`].
     pub fn converted(&self, conversion: &Conversion, power: i8) -> Result<u64, Error> {
         let field = self.field;
         if field.value_type >= TEXT || conversion.offset_decimals > MOST_DECIMALS {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         self.available(conversion)?;
         let ((significand, is_below), exponent) = if field.value_type >= FLOAT {
@@ -125,8 +125,8 @@ impl Words<'_> {
     /// A value times 10^`decimals`, rounded to the nearest, halves away from 0.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a type that is not a bit or an integer of 16 or 32 bits,
-    /// and for too many decimals; [`Error::NOT_AVAILABLE`]; [`Error::OUT_OF_RANGE`] if the result
+    /// [`Error::InvalidArgument`] for a type that is not a bit or an integer of 16 or 32 bits,
+    /// and for too many decimals; [`Error::NotAvailable`]; [`Error::OutOfRange`] if the result
     /// is out of range, or if a number on the way to it has more than 64 bits.
     pub fn decimal(&self, conversion: &Conversion, power: i8, decimals: u8) -> Result<i32, Error> {
         let field = self.field;
@@ -134,7 +134,7 @@ impl Words<'_> {
             || conversion.offset_decimals > MOST_DECIMALS
             || decimals > MOST_DECIMALS
         {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         self.available(conversion)?;
         // Both terms, as integers, have the denominator divisor * 10^less.
@@ -156,7 +156,7 @@ impl Words<'_> {
         let denominator = times_power(divisor.into(), less)?;
         let is_below = is_below != (field.multiplier < 0);
         let (sum, is_below) = if is_below == (conversion.offset < 0) {
-            let sum = number.checked_add(offset).ok_or(Error::OUT_OF_RANGE)?;
+            let sum = number.checked_add(offset).ok_or(Error::OutOfRange)?;
             (sum, is_below)
         } else if number >= offset {
             (number - offset, is_below)
@@ -164,7 +164,7 @@ impl Words<'_> {
             (offset - number, !is_below)
         };
         let rounded = u32::try_from(quotient(sum, denominator));
-        signed(rounded.map_err(|_| Error::OUT_OF_RANGE)?, is_below)
+        signed(rounded.map_err(|_| Error::OutOfRange)?, is_below)
     }
 }
 
@@ -198,7 +198,7 @@ fn times_power(mut number: u64, power: i8) -> Result<u64, Error> {
         let carry;
         (number, carry) = times_small(number, 10);
         if carry != 0 {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
     }
     Ok(number)

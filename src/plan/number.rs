@@ -33,13 +33,13 @@ impl Words<'_> {
     /// counts.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a text or for registers as they are.
+    /// [`Error::InvalidArgument`] for a text or for registers as they are.
     pub fn number(&self) -> Result<u64, Error> {
         let field = self.field;
         let (multiplier, divisor) = scale(field);
         let mut sign = if field.multiplier < 0 { SIGN } else { 0 };
         let (significand, exponent) = match field.value_type {
-            TEXT | REGISTERS => return Err(Error::INVALID_ARGUMENT),
+            TEXT | REGISTERS => return Err(Error::InvalidArgument),
             FLOAT | DOUBLE => {
                 let bits = self.double()?;
                 sign ^= bits & SIGN;

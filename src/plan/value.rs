@@ -21,12 +21,12 @@ pub struct Words<'a> {
 /// `address` is the first address of the read.
 ///
 /// # Errors
-/// [`Error::INVALID_ARGUMENT`] if the field has no such value. A text is one value, and so are
+/// [`Error::InvalidArgument`] if the field has no such value. A text is one value, and so are
 /// bits of a register. (Out of line, a plan takes 56 bytes more on a Cortex-M0+.)
 #[inline(always)]
 pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Error> {
     if index >= field.values() {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     let place = field
         .address
@@ -98,13 +98,13 @@ impl Words<'_> {
     /// of 32.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for other types.
+    /// [`Error::InvalidArgument`] for other types.
     pub fn float(&self) -> Result<u32, Error> {
         let raw = self.raw();
         match self.field.value_type {
             FLOAT => Ok(raw as u32),
             DOUBLE => Ok(ShortDouble::from_bytes(raw.to_be_bytes()).0.to_bits()),
-            _ => Err(Error::INVALID_ARGUMENT),
+            _ => Err(Error::InvalidArgument),
         }
     }
 
@@ -121,19 +121,19 @@ impl Words<'_> {
                 Ok(u64::from_be_bytes(number.to_bytes()))
             }
             DOUBLE => Ok(raw),
-            _ => Err(Error::INVALID_ARGUMENT),
+            _ => Err(Error::InvalidArgument),
         }
     }
 
     /// Copies a text, up to its first NUL and without it; returns how many characters.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a field of another type; [`Error::BUFFER_TOO_SMALL`]
+    /// [`Error::InvalidArgument`] for a field of another type; [`Error::BufferTooSmall`]
     /// if `text` cannot hold it. Nothing is copied then.
     pub fn text(&self, text: &mut [u8]) -> Result<usize, Error> {
         let field = self.field;
         if field.value_type != TEXT {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let character = |index: usize| {
             let [high, low] = self.word(index / 2).to_be_bytes();
@@ -147,7 +147,7 @@ impl Words<'_> {
         let count = (0..length)
             .position(|index| character(index) == 0)
             .unwrap_or(length);
-        let text = text.get_mut(..count).ok_or(Error::BUFFER_TOO_SMALL)?;
+        let text = text.get_mut(..count).ok_or(Error::BufferTooSmall)?;
         for (index, place) in text.iter_mut().enumerate() {
             *place = character(index);
         }
@@ -184,20 +184,20 @@ impl Words<'_> {
     /// nearest, halves away from 0.
     ///
     /// # Errors
-    /// [`Error::INVALID_ARGUMENT`] for a float, a text or registers as they are;
-    /// [`Error::OUT_OF_RANGE`] if the result is out of range.
+    /// [`Error::InvalidArgument`] for a float, a text or registers as they are;
+    /// [`Error::OutOfRange`] if the result is out of range.
     pub fn integer(&self) -> Result<i64, Error> {
         let field = self.field;
         if field.value_type > INT64 {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let (raw, is_below) = self.magnitude();
         let (multiplier, divisor) = scale(field);
         let (whole, part) = divide(multiplier, divisor);
-        let scaled = times(raw, whole, part, divisor).ok_or(Error::OUT_OF_RANGE)?;
+        let scaled = times(raw, whole, part, divisor).ok_or(Error::OutOfRange)?;
         let is_below = is_below != (field.multiplier < 0);
         if scaled > i64::MAX as u64 + u64::from(is_below) {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         Ok(if is_below {
             scaled.wrapping_neg()
@@ -210,12 +210,12 @@ impl Words<'_> {
     /// As [`Words::integer`], with 32 bits throughout.
     ///
     /// # Errors
-    /// As [`Words::integer`]; [`Error::INVALID_ARGUMENT`] also for an integer of 64 bits, and
-    /// [`Error::OUT_OF_RANGE`] also if the product before the division does not fit into 32 bits.
+    /// As [`Words::integer`]; [`Error::InvalidArgument`] also for an integer of 64 bits, and
+    /// [`Error::OutOfRange`] also if the product before the division does not fit into 32 bits.
     pub fn int32(&self) -> Result<i32, Error> {
         let field = self.field;
         if field.value_type > INT32 {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         let mut raw = self.raw_32();
         let mut is_below = field.multiplier < 0;
@@ -230,7 +230,7 @@ impl Words<'_> {
         let (multiplier, divisor) = scale(field);
         let half = divisor / 2;
         if raw > divide(u32::MAX - half, multiplier).0 {
-            return Err(Error::OUT_OF_RANGE);
+            return Err(Error::OutOfRange);
         }
         let (scaled, _) = divide(raw * multiplier + half, divisor);
         signed(scaled, is_below)
@@ -240,11 +240,11 @@ impl Words<'_> {
 /// The integer with this magnitude.
 ///
 /// # Errors
-/// [`Error::OUT_OF_RANGE`]
+/// [`Error::OutOfRange`]
 #[inline(always)]
 pub(super) fn signed(magnitude: u32, is_below: bool) -> Result<i32, Error> {
     if magnitude > i32::MAX as u32 + u32::from(is_below) {
-        return Err(Error::OUT_OF_RANGE);
+        return Err(Error::OutOfRange);
     }
     Ok(if is_below {
         magnitude.wrapping_neg()

@@ -93,7 +93,7 @@ where
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
         let failed = match self.is_serial {
             true => Ok(0),
-            false => Err(Error::LINK_LOST),
+            false => Err(Error::LinkLost),
         };
         match self.device.read_ready() {
             Ok(false) => Ok(0),
@@ -114,9 +114,9 @@ where
                     self.note_sent(written);
                     Ok(written)
                 }
-                Err(_) => Err(Error::LINK_LOST),
+                Err(_) => Err(Error::LinkLost),
             },
-            Err(_) => Err(Error::LINK_LOST),
+            Err(_) => Err(Error::LinkLost),
         }
     }
 

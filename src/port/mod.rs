@@ -25,7 +25,7 @@ pub trait Port {
     /// their number, 0 if none has arrived yet.
     ///
     /// # Errors
-    /// [`Error::LINK_LOST`]. Every other error counts as that.
+    /// [`Error::LinkLost`]. Every other error counts as that.
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error>;
 
     /// Accepts bytes to send. Returns the number of bytes accepted, 0 if the port cannot accept
@@ -84,7 +84,7 @@ fn count(result: Result<usize, Error>, most: usize) -> i16 {
 /// The result of [`Port::read`] if [`Port::read_count`] returns `count`.
 #[doc(hidden)]
 pub fn result(count: i16) -> Result<usize, Error> {
-    count.try_into().map_err(|_| Error::LINK_LOST)
+    count.try_into().map_err(|_| Error::LinkLost)
 }
 
 #[cfg(test)]
@@ -116,8 +116,8 @@ mod tests {
             (Ok(0), [0, 0]),
             (Ok(7), [7, 7]),
             (Ok(usize::MAX), [8, i16::MAX]),
-            (Err(Error::LINK_LOST), [-1, -1]),
-            (Err(Error::BUSY), [-1, -1]),
+            (Err(Error::LinkLost), [-1, -1]),
+            (Err(Error::Busy), [-1, -1]),
         ] {
             let mut port = Claims(claimed);
             for (length, count) in [8, 40_000].into_iter().zip(counts) {
@@ -132,7 +132,7 @@ mod tests {
     fn a_negative_count_is_a_lost_link() {
         assert_eq!(result(0), Ok(0));
         assert_eq!(result(i16::MAX), Ok(MOST));
-        assert_eq!(result(-1), Err(Error::LINK_LOST));
-        assert_eq!(result(i16::MIN), Err(Error::LINK_LOST));
+        assert_eq!(result(-1), Err(Error::LinkLost));
+        assert_eq!(result(i16::MIN), Err(Error::LinkLost));
     }
 }

@@ -498,7 +498,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
                     return self.found(header.total - tcp::PDU);
                 }
                 Ok(header) => until = header.total,
-                Err(Error::INCOMPLETE_FRAME) => {}
+                Err(Error::IncompleteFrame) => {}
                 Err(_) => return self.fail_stream(),
             }
             let received = self.read_bytes_not_inlined(until);

@@ -256,7 +256,7 @@ impl Context<'_> {
     /// Examines the TCP bytes at the place of the search.
     pub fn tcp(&self, stream: &RxStream, bytes: &[u8], capacity: usize) -> Candidate {
         let header = match tcp::header(bytes) {
-            Err(Error::INCOMPLETE_FRAME) if !self.has_timed_out(stream) => {
+            Err(Error::IncompleteFrame) if !self.has_timed_out(stream) => {
                 return Candidate::Wait(tcp::next_part(bytes.len()));
             }
             Err(_) => return Candidate::NoFrame,

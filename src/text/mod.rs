@@ -66,7 +66,7 @@ fn characters(line: &mut TextWriter, side: PduKind, frame: &[u8], end: u8) {
             }
             ascii::parse(copy, end)
         }
-        None => Err(Error::MALFORMED_FRAME),
+        None => Err(Error::MalformedFrame),
     };
     adu(line, side, parsed, frame.len());
 }
@@ -87,8 +87,8 @@ fn adu(line: &mut TextWriter, side: PduKind, parsed: Result<Adu, Error>, length:
             );
             response(line, adu.pdu, &[]);
         }
-        Err(Error::INVALID_CRC) => bytes(line, "bad CRC", length),
-        Err(Error::INCOMPLETE_FRAME) => bytes(line, "incomplete frame", length),
+        Err(Error::InvalidCrc) => bytes(line, "bad CRC", length),
+        Err(Error::IncompleteFrame) => bytes(line, "incomplete frame", length),
         Err(_) => bytes(line, "no frame", length),
     }
 }

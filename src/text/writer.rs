@@ -129,15 +129,15 @@ impl<'a> TextWriter<'a> {
     /// Ends the text and returns its number of characters.
     ///
     /// # Errors
-    /// [`Error::BUFFER_TOO_SMALL`] if the text was cut off.
+    /// [`Error::BufferTooSmall`] if the text was cut off.
     pub fn finish(self) -> Result<usize, Error> {
         if let Some(end) = self.text.get_mut(self.length) {
             *end = 0;
         } else {
-            return Err(Error::BUFFER_TOO_SMALL);
+            return Err(Error::BufferTooSmall);
         }
         if self.is_cut {
-            Err(Error::BUFFER_TOO_SMALL)
+            Err(Error::BufferTooSmall)
         } else {
             Ok(self.length)
         }
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn text_that_does_not_fit_is_cut_and_still_ends_with_zero() {
         assert_eq!(text(4, |line| line.put("abc")), (Ok(3), "abc".into()));
-        let short = Err(Error::BUFFER_TOO_SMALL);
+        let short = Err(Error::BufferTooSmall);
         assert_eq!(text(3, |line| line.put("abc")), (short, "ab".into()));
         assert_eq!(text(1, |line| line.put("abc")), (short, "".into()));
         assert_eq!(text(0, |_| ()), (short, "".into()));

@@ -39,7 +39,7 @@ impl Port for Tap {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         if wire.lost {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         let mut count = 0;
         for place in bytes {
@@ -56,7 +56,7 @@ impl Port for Tap {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let wire = &mut *self.0.borrow_mut();
         if wire.lost {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         let count = match wire.piece {
             0 => bytes.len(),

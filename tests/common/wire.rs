@@ -57,7 +57,7 @@ impl Port for End {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.dead {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         let now = wire.now;
         let Some((at, first)) = wire.incoming.front_mut() else {
@@ -78,7 +78,7 @@ impl Port for End {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.dead {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         if wire.stuck {
             return Ok(0);

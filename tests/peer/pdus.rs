@@ -124,18 +124,18 @@ fn reserved_sub_functions_are_refused_though_pymodbus_has_them() {
         "diag_read_iop_overrun_count()",
         "diag_getclear_modbus_response(data=3)",
     ] {
-        check_refused(Direction::Request, call, Error::ILLEGAL_FUNCTION);
+        check_refused(Direction::Request, call, Error::IllegalFunction);
     }
 }
 
 #[test]
 fn a_delimiter_in_the_low_byte_is_refused_though_pymodbus_sends_it_there() {
     let call = "diag_change_ascii_input_delimeter(delimiter=0x21)";
-    check_refused(Direction::Request, call, Error::ILLEGAL_DATA_VALUE);
+    check_refused(Direction::Request, call, Error::IllegalDataValue);
 }
 
 #[test]
 fn a_response_to_force_listen_only_is_malformed_though_pymodbus_sends_one() {
     let response = "ForceListenOnlyModeResponse()";
-    check_refused(Direction::Response, response, Error::MALFORMED_REPLY);
+    check_refused(Direction::Response, response, Error::MalformedReply);
 }

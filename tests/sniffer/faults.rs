@@ -281,7 +281,7 @@ fn a_buffer_too_small_for_the_text_is_reported() {
     let mut text = [0xEE; 20];
     let mut line = TextWriter::new(&mut text);
     event.text(&mut line);
-    assert_eq!(line.finish(), Err(Error::BUFFER_TOO_SMALL));
+    assert_eq!(line.finish(), Err(Error::BufferTooSmall));
     assert_eq!(&text, b"unit 17  request   \0");
 }
 

@@ -30,7 +30,7 @@ impl Port for TestPort {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.is_lost {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         let count = bytes.len().min(wire.arriving.len());
         for (place, byte) in bytes.iter_mut().zip(wire.arriving.drain(..count)) {
@@ -42,7 +42,7 @@ impl Port for TestPort {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
         let mut wire = self.0.borrow_mut();
         if wire.is_lost {
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         }
         let accepted = wire.accepts.pop_front().unwrap_or(usize::MAX);
         Ok(accepted.min(bytes.len()))

@@ -195,7 +195,7 @@ fn a_lost_link_hands_out_the_rest() {
         } else {
             bench.trace.write(&reply)
         };
-        assert_eq!(count, Err(Error::LINK_LOST));
+        assert_eq!(count, Err(Error::LinkLost));
         let expected = [record(
             Received,
             Response,

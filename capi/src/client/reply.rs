@@ -13,12 +13,12 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
     let state = request.state();
     let function = state.function();
     let length = match state.status {
-        Status::OK if function == 0 || !state.has_reply() => return Err(Error::INVALID_ARGUMENT),
+        Status::OK if function == 0 || !state.has_reply() => return Err(Error::InvalidArgument),
         Status::OK if state.has_data() && !request.wants_data() => {
-            return Err(Error::BUFFER_TOO_SMALL);
+            return Err(Error::BufferTooSmall);
         }
         Status::OK if state.repeats_data() && !request.has_data() => {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         Status::OK => {
             let received = |index| request.received_byte(index);
@@ -26,7 +26,7 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
             state.restore_response(pdu, state.length, received, sent)?
         }
         status if status.is_exception() && status.code() == state.exception => {
-            let place = pdu.first_chunk_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
+            let place = pdu.first_chunk_mut().ok_or(Error::BufferTooSmall)?;
             *place = state.exception_pdu(state.exception);
             place.len()
         }
@@ -88,9 +88,9 @@ pub unsafe extern "C" fn mbm_client_reply(
 ) -> u8 {
     let made = || {
         let request = RequestPtr::new(request.cast_mut());
-        let request = request.ok_or(Error::INVALID_ARGUMENT)?;
+        let request = request.ok_or(Error::InvalidArgument)?;
         if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         required(packet)?;
         packet_of(request, buffer(pdu, capacity)?)

@@ -54,7 +54,7 @@ impl mbm_packet {
     pub(crate) fn head(&self) -> Result<Head, Error> {
         Ok(Head {
             transaction: self.transaction,
-            unit: self.unit.try_into().or(Err(Error::INVALID_ARGUMENT))?,
+            unit: self.unit.try_into().or(Err(Error::InvalidArgument))?,
             function: self.function,
         })
     }
@@ -89,12 +89,12 @@ impl mbm_packet {
             MBM_PACKET_RESPONSE => {
                 Response::take(function, &mut PacketWithData { packet: self, data })
             }
-            MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => Err(Error::INVALID_FUNCTION),
+            MBM_PACKET_EXCEPTION if function & EXCEPTION != 0 => Err(Error::InvalidFunction),
             MBM_PACKET_EXCEPTION => Ok(Response::Exception {
                 function,
                 code: self.exceptionCode,
             }),
-            _ => Err(Error::INVALID_ARGUMENT),
+            _ => Err(Error::InvalidArgument),
         }
     }
 

@@ -144,7 +144,7 @@ unsafe fn add(
     (data, length): (*const u8, u16),
     write: impl FnOnce(&mut mbm_packet, &[u8], &mut [u8]) -> Result<usize, Error>,
 ) -> Result<(), Error> {
-    let refused = Error::INVALID_ARGUMENT;
+    let refused = Error::InvalidArgument;
     // Data and storage do not overlap.
     let mut extended = get(packet)?;
     let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
@@ -228,10 +228,10 @@ pub unsafe extern "C" fn mbm_packet_addObject(
     };
     let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {
         if !packet.has_objects() {
-            return Err(Error::ILLEGAL_FUNCTION);
+            return Err(Error::IllegalFunction);
         }
         let count = packet.objectCount.checked_add(1);
-        packet.objectCount = count.ok_or(Error::BUFFER_TOO_SMALL)?;
+        packet.objectCount = count.ok_or(Error::BufferTooSmall)?;
         groups::put_object(added.id, value, space)
     };
     let value = (added.data, added.length.into());

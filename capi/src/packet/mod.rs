@@ -152,7 +152,7 @@ pub(super) fn side(kind: u8) -> Result<PduKind, Error> {
     match kind {
         MBM_PACKET_REQUEST => Ok(PduKind::Request),
         MBM_PACKET_RESPONSE => Ok(PduKind::Response),
-        _ => Err(Error::INVALID_ARGUMENT),
+        _ => Err(Error::InvalidArgument),
     }
 }
 
@@ -243,7 +243,7 @@ pub(super) unsafe fn reply_length(
     measure: impl FnOnce(&Request) -> Length,
 ) -> Result<Length, Error> {
     if packet.kind != MBM_PACKET_REQUEST {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     let request = packet.request(packet.data()?)?;
     packet::emit_request(&request, functions, &mut [0; MAX_PDU])?;

@@ -84,7 +84,7 @@ unsafe fn power_of(plan: *const mbm_plan, field: u16, of: u16) -> Result<i8, Err
     let is_late = own.status() != Status::OK && other.status() == Status::OK;
     let mut words = MaybeUninit::uninit();
     if is_late || !own.has_data() {
-        return Err(Error::NOT_AVAILABLE);
+        return Err(Error::NotAvailable);
     }
     find_words(plan, field, 0, &mut words).result()?;
     power(words.assume_init_ref())
@@ -156,7 +156,7 @@ unsafe fn with_words<T>(
     let mut own: Field = *fields.add(field.into()).cast();
     own.check(1).result()?;
     if own.is_in_bits() {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     let (first, before) = place(&own, own.address, index)?;
     let view = view(registers, MBM_ORDER_DEFAULT, false)?;

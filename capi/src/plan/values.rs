@@ -251,7 +251,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
 ) -> u8 {
     let copy = |words: &Words| {
         let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-        let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
+        let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let count = words.text(place)?;
         *place.get_mut(count).unwrap_or(end) = 0;
         Ok(())
@@ -280,7 +280,7 @@ pub unsafe extern "C" fn mbm_plan_getRegisters(
 ) -> u8 {
     get(plan, field, 0, registers, |words| {
         if words.field.is_in_bits() {
-            return Err(Error::INVALID_ARGUMENT);
+            return Err(Error::InvalidArgument);
         }
         Ok(mbm_registers {
             data: words.words.as_ptr().cast(),
@@ -327,7 +327,7 @@ pub unsafe extern "C" fn mbm_plan_getRead(
     let find = || {
         pointers::check(plan).result()?;
         let own = (*pointers::object(plan)).reads().get(usize::from(index));
-        let own = own.ok_or(Error::INVALID_ARGUMENT)?;
+        let own = own.ok_or(Error::InvalidArgument)?;
         Ok(mbm_planReadInfo {
             intervalMs: own.interval_ms,
             address: own.address,

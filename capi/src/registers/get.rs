@@ -174,7 +174,7 @@ pub unsafe extern "C" fn mbm_registers_getString(
     }
     code(view(registers, order, false).and_then(|registers| {
         let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-        let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
+        let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let count = registers.text(address, length.into(), place)?.len();
         *place.get_mut(count).unwrap_or(end) = 0;
         Ok(())

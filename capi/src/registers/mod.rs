@@ -88,7 +88,7 @@ pub(super) fn order(code: u8, default: Order) -> Result<Order, Error> {
         MBM_ORDER_CDABGHEF => Ok(Order::Cdabghef),
         MBM_ORDER_FEHGBADC => Ok(Order::Fehgbadc),
         MBM_ORDER_DCBAHGFE => Ok(Order::Dcbahgfe),
-        _ => Err(Error::INVALID_ARGUMENT),
+        _ => Err(Error::InvalidArgument),
     }
 }
 
@@ -139,14 +139,14 @@ pub(crate) unsafe fn view(
 ) -> Result<Registers<BorrowedRegisters>, Error> {
     let fields = pointers::get(registers)?;
     if fields.data.is_null() {
-        return Err(Error::NOT_INITIALISED);
+        return Err(Error::NotInitialised);
     }
     let words = match fields.kind {
         MBM_REGISTERS_INTO_WORDS => true,
         MBM_REGISTERS_INTO_BYTES => false,
         MBM_REGISTERS_OF_WORDS if !to_write => true,
         MBM_REGISTERS_OF_BYTES if !to_write => false,
-        _ => return Err(Error::INVALID_ARGUMENT),
+        _ => return Err(Error::InvalidArgument),
     };
     let default = order(fields.order, Order::Abcd)?;
     let cells = BorrowedRegisters {

@@ -19,7 +19,7 @@ fn form_of(form: u8) -> Result<TextForm, Error> {
         0 => Characters::Both,
         MBM_TEXT_LOW_BYTES => Characters::Low,
         MBM_TEXT_HIGH_BYTES => Characters::High,
-        _ => return Err(Error::INVALID_ARGUMENT),
+        _ => return Err(Error::InvalidArgument),
     };
     Ok(TextForm {
         characters,
@@ -54,7 +54,7 @@ pub unsafe extern "C" fn mbm_registers_getText(
     code(view(registers, order, false).and_then(|registers| {
         let form = form_of(form)?;
         let text = slice_mut::<u8>(text.cast(), capacity.into())?;
-        let (end, place) = text.split_last_mut().ok_or(Error::BUFFER_TOO_SMALL)?;
+        let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let order = registers.order;
         let found = registers.text_of(form, order, address, length.into(), place)?;
         let count = found.len();

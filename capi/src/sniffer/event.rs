@@ -152,7 +152,7 @@ impl mbm_event {
             .map(RequestStart::new)
             .filter(|_| self.requestHeadLength > 0);
         Ok(Event {
-            kind: EventKind::from_code(self.kind).ok_or(Error::INVALID_ARGUMENT)?,
+            kind: EventKind::from_code(self.kind).ok_or(Error::InvalidArgument)?,
             status: Status::from_code(self.status),
             time: self.timeUs,
             response_time: self.responseTimeUs,

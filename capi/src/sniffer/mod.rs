@@ -77,11 +77,11 @@ const NO_FUNCTION: Function = Function {
 fn convert(functions: &[mbm_function]) -> Result<[Function; FUNCTIONS], Error> {
     let mut converted = [NO_FUNCTION; FUNCTIONS];
     if functions.len() > FUNCTIONS {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     for (place, function) in converted.iter_mut().zip(functions) {
         let declaration = declared(core::slice::from_ref(function), Some(function.code))?;
-        *place = declaration.ok_or(Error::INVALID_ARGUMENT)?;
+        *place = declaration.ok_or(Error::InvalidArgument)?;
     }
     Ok(converted)
 }

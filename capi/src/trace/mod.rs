@@ -124,7 +124,7 @@ unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) 
 
 /// The return value of a trace's port while the port must not be used.
 fn unusable(error: Error) -> i16 {
-    if error == Error::BUSY {
+    if error == Error::Busy {
         0
     } else {
         -1
@@ -159,13 +159,13 @@ unsafe fn begin(
     // A trace that passes its own bytes on to itself would never end.
     let is_own = port.context == trace.cast();
     if !port.is_complete() || trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     if size < MBM_MIN_TRACE_BUFFER {
-        return Err(Error::BUFFER_TOO_SMALL);
+        return Err(Error::BufferTooSmall);
     }
     if mbm_trace::mark(trace).read() == IN_HOOK {
-        return Err(Error::BUSY);
+        return Err(Error::Busy);
     }
     let observer = CObserver {
         hook,
@@ -207,7 +207,7 @@ unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing
     let functions = slice(described.functions, described.functionCount.into())?;
     declared(functions, None)?;
     if !is_delimiter(described.end()) {
-        return Err(Error::INVALID_ARGUMENT);
+        return Err(Error::InvalidArgument);
     }
     Ok((described, described.of_frames()?))
 }

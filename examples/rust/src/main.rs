@@ -29,7 +29,7 @@ fn read_polled() -> Result<[u16; 2], Error> {
     master.wait(|| { /* The firmware does its other work here. */ })?;
     match *master.response() {
         [first, second] => Ok([first, second]),
-        _ => Err(Error::MALFORMED_REPLY),
+        _ => Err(Error::MalformedReply),
     }
 }
 

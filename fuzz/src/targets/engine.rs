@@ -53,7 +53,7 @@ impl<const SINGLE: bool> Port for Line<SINGLE> {
         }
         let Next::Bytes(waiting) = next else {
             self.lost = true;
-            return Err(mbm::Error::LINK_LOST);
+            return Err(mbm::Error::LinkLost);
         };
         let count = waiting.len().min(bytes.len());
         for (place, byte) in bytes.iter_mut().zip(waiting.drain(..count)) {

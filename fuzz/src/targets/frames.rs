@@ -12,9 +12,9 @@ pub fn rtu(data: &[u8]) {
 
 fn check_rtu(frame: &[u8]) {
     let expected = match frame.len() {
-        0..=3 => Err(Error::INCOMPLETE_FRAME),
-        257.. => Err(Error::MALFORMED_FRAME),
-        _ if !naive::has_crc(frame) => Err(Error::INVALID_CRC),
+        0..=3 => Err(Error::IncompleteFrame),
+        257.. => Err(Error::MalformedFrame),
+        _ if !naive::has_crc(frame) => Err(Error::InvalidCrc),
         length => Ok((frame[0], &frame[1..length - 2])),
     };
     let parsed = rtu::parse(frame);
@@ -40,7 +40,7 @@ pub fn ascii(data: &[u8]) {
         return;
     };
     let written = ascii::emit(&mut buffer, unit, end, |place| {
-        let place = place.get_mut(..pdu.len()).ok_or(Error::BUFFER_TOO_SMALL)?;
+        let place = place.get_mut(..pdu.len()).ok_or(Error::BufferTooSmall)?;
         place.copy_from_slice(pdu);
         Ok(pdu.len())
     });
@@ -79,7 +79,7 @@ fn check_ascii(frame: &[u8], end: u8) {
         }
         Err(status) => assert!(matches!(
             status,
-            Error::INCOMPLETE_FRAME | Error::MALFORMED_FRAME | Error::INVALID_CRC
+            Error::IncompleteFrame | Error::MalformedFrame | Error::InvalidCrc
         )),
     }
 }
@@ -109,10 +109,10 @@ fn check_tcp(frame: &[u8]) {
             });
             assert_eq!(&buffer[..length.expect("the frame fits")], frame);
             for end in 0..frame.len() {
-                assert_eq!(tcp::parse(&frame[..end]), Err(Error::INCOMPLETE_FRAME));
+                assert_eq!(tcp::parse(&frame[..end]), Err(Error::IncompleteFrame));
             }
         }
-        Err(Error::INCOMPLETE_FRAME) => {
+        Err(Error::IncompleteFrame) => {
             // If the header is valid, the missing bytes complete the frame.
             if let Ok(header) = tcp::header(frame) {
                 let mut whole = frame.to_vec();

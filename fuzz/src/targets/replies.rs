@@ -86,7 +86,7 @@ fn check_restored(input: &mut Input) {
     assert_eq!(&restored[..response.len()], response);
     let short = &mut restored[..response.len() - 1];
     let refused = state.restore_response(short, count, received, sent);
-    assert_eq!(refused, Err(Error::BUFFER_TOO_SMALL));
+    assert_eq!(refused, Err(Error::BufferTooSmall));
 }
 
 fn check_stream(input: &mut Input) {

@@ -24,7 +24,7 @@ fn check_received(pdu: &[u8], functions: &[Function]) {
             assert_eq!(request.emit(&mut buffer), Ok(pdu.len()));
             assert_eq!(&buffer[..pdu.len()], pdu);
             let short = request.emit(&mut buffer[..pdu.len() - 1]);
-            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BufferTooSmall));
             lengths::agree(pdu, |front| length::request(front, functions));
             request.response_length(functions);
         }

@@ -25,7 +25,7 @@ fn check_received(pdu: &[u8], functions: &[Function]) {
             assert_eq!(response.emit(&mut buffer), Ok(pdu.len()));
             assert_eq!(&buffer[..pdu.len()], pdu);
             let short = response.emit(&mut buffer[..pdu.len() - 1]);
-            assert_eq!(short, Err(Error::BUFFER_TOO_SMALL));
+            assert_eq!(short, Err(Error::BufferTooSmall));
             match response {
                 // Some devices send more than their byte count says. Only the framing shows the
                 // length of such a response.
@@ -35,7 +35,7 @@ fn check_received(pdu: &[u8], functions: &[Function]) {
         }
         Err(status) => assert!(matches!(
             status,
-            Error::INVALID_FUNCTION | Error::MALFORMED_REPLY
+            Error::InvalidFunction | Error::MalformedReply
         )),
     }
 }

@@ -224,7 +224,7 @@ impl<J: ClientRequest> Refused<J> {
         match self.0.state().status.result() {
             Err(error) => error,
             // The program has changed the state since.
-            Ok(()) => Error::INVALID_ARGUMENT,
+            Ok(()) => Error::InvalidArgument,
         }
     }
 }

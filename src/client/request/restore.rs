@@ -35,7 +35,7 @@ impl RequestState {
     /// also if the device counted fewer bytes.
     ///
     /// # Errors
-    /// [`Error::BUFFER_TOO_SMALL`] if it does not fit.
+    /// [`Error::BufferTooSmall`] if it does not fit.
     pub fn restore_response(
         &self,
         pdu: &mut [u8],
@@ -51,7 +51,7 @@ impl RequestState {
         } else {
             self.spec.repeated().into()
         };
-        let place = pdu.get_mut(..length).ok_or(Error::BUFFER_TOO_SMALL)?;
+        let place = pdu.get_mut(..length).ok_or(Error::BufferTooSmall)?;
         let before = self.before_data(stored);
         for (index, byte) in place.iter_mut().enumerate() {
             *byte = if !self.has_data() {

@@ -61,7 +61,7 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             let rest = self.storage.bytes(self.start, self.end - self.start);
             let header = match tcp::header(rest) {
                 Ok(header) => header,
-                Err(Error::INCOMPLETE_FRAME) => return None,
+                Err(Error::IncompleteFrame) => return None,
                 Err(_) => {
                     self.skip_byte();
                     continue;
