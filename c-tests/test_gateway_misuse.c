@@ -43,7 +43,9 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
                                            {256, 257, 0, 0},
                                            {0, 256, MBM_GATEWAY_ALL_LINES, 0},
                                            {1, 1, 0, 300},
-                                           {1, 1, MBM_GATEWAY_LOCAL, 256}};
+                                           {0, 0, MBM_GATEWAY_ALL_LINES, MBM_GATEWAY_UNIT_0},
+                                           {1, 1, 0, MBM_GATEWAY_UNIT_0 + 1},
+                                           {1, 1, MBM_GATEWAY_LOCAL, 300}};
     static mbm_client none;
     mbm_gatewayLine line = {0};
     mbm_gatewayConfig config;

@@ -278,3 +278,123 @@ TEST(a_function_that_cannot_be_broadcast_gets_01)
     SILENT(b.wires[0]);
     SILENT(b.wires[1]);
 }
+
+TEST(a_broadcast_that_its_line_does_not_send_gets_0a)
+{
+    static const mbm_gatewayRoute one[] = {{0, 31, 0, 0}};
+
+    gateway_bench_start(&b, one, COUNT(one));
+    b.wires[0].is_lost = 1;
+    ASK(0, 1, 0, WRITE);
+    EXPECT(0, 1, 0, "\x86\x0A");
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
+}
+
+/* --- unit 0 of a line with TCP frames --- */
+
+/* Begins a gateway whose line 1 has TCP frames. */
+static void start_with_tcp(const mbm_gatewayRoute *map, unsigned count)
+{
+    static uint8_t outgoing[MBM_MAX_TCP_FRAME];
+    mbm_port port;
+
+    gateway_bench_start(&b, map, count);
+    port = memory_port_of(&b.wires[1]);
+    OK(mbm_client_beginTcp(&b.clients[1], &port, b.frames[1], MBM_MAX_TCP_FRAME, outgoing,
+                           sizeof outgoing));
+    OK(mbm_client_setResponseTimeout(&b.clients[1], 100));
+}
+
+/* A request for a unit arrives at the device of that line, which replies, if `reply` is not NULL.
+ */
+static void at_device(uint8_t unit, const char *pdu, size_t length, const char *reply,
+                      size_t reply_length)
+{
+    uint8_t header[7] = {0, 0, 0, 0, 0, 0, unit};
+
+    while (b.wires[1].sent_count < sizeof header + length)
+        assert_true(gateway_bench_step(&b));
+    memcpy(header, b.wires[1].sent, 2);
+    header[5] = (uint8_t)(length + 1);
+    assert_int_equal(b.wires[1].sent_count, sizeof header + length);
+    assert_memory_equal(b.wires[1].sent, header, sizeof header);
+    assert_memory_equal(b.wires[1].sent + sizeof header, pdu, length);
+    b.wires[1].sent_count = 0;
+    if (!reply)
+        return;
+    header[5] = (uint8_t)(reply_length + 1);
+    memory_port_bytes(&b.wires[1], header, sizeof header);
+    memory_port_bytes(&b.wires[1], (const uint8_t *)reply, reply_length);
+}
+
+#define AT_DEVICE(unit, pdu, reply) at_device(unit, pdu, sizeof(pdu) - 1, reply, sizeof(reply) - 1)
+
+TEST(unit_0_of_a_line_with_tcp_frames_answers)
+{
+    static const mbm_gatewayRoute both[] = {{0, 0, 1, 0}, {5, 6, 1, MBM_GATEWAY_UNIT_0}};
+    static const uint8_t units[] = {0, 5};
+
+    start_with_tcp(both, COUNT(both));
+    for (unsigned i = 0; i < COUNT(units); i++) {
+        ASK(0, 0x100, units[i], READ);
+        AT_DEVICE(0, READ, VALUE);
+        EXPECT(0, 0x100, units[i], VALUE);
+        ASK(0, 0x101, units[i], WRITE);
+        AT_DEVICE(0, WRITE, WRITE);
+        EXPECT(0, 0x101, units[i], WRITE);
+        ASK(0, 0x102, units[i], READ);
+        AT_DEVICE(0, READ, "\x83\x02");
+        EXPECT(0, 0x102, units[i], "\x83\x02");
+        ASK(0, 0x103, units[i], WRITE);
+        at_device(0, WRITE, sizeof WRITE - 1, NULL, 0);
+        EXPECT(0, 0x103, units[i], "\x86\x0B");
+        ASK(0, 0x104, units[i], "\x41");
+        AT_DEVICE(0, "\x41", "\x41");
+        EXPECT(0, 0x104, units[i], "\x41");
+        ASK(0, 0x105, units[i], "\x08\x00\x04\x00\x00");
+        at_device(0, "\x08\x00\x04\x00\x00", 5, NULL, 0);
+        SILENT(b.sockets[0]);
+    }
+    ASK(0, 0x106, 6, READ);
+    AT_DEVICE(1, READ, VALUE);
+    EXPECT(0, 0x106, 6, VALUE);
+    b.wires[1].is_lost = 1;
+    ASK(0, 0x107, 5, WRITE);
+    EXPECT(0, 0x107, 5, "\x86\x0A");
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
+}
+
+TEST(a_unit_that_leads_to_0_of_a_serial_line_is_a_broadcast)
+{
+    static const mbm_gatewayRoute five[] = {{5, 5, 0, MBM_GATEWAY_UNIT_0}};
+
+    start_with_tcp(five, COUNT(five));
+    ASK(0, 1, 5, WRITE);
+    ON_LINE(0, 0, WRITE);
+    SILENT(b.sockets[0]);
+    ASK(0, 2, 5, READ);
+    EXPECT(0, 2, 5, "\x83\x01");
+}
+
+TEST(a_broadcast_to_all_lines_goes_to_unit_0_of_one_with_tcp_frames_and_its_response_is_dropped)
+{
+    static const mbm_gatewayRoute all[] = {{0, 0, MBM_GATEWAY_ALL_LINES, 0}, {1, 31, 1, 0}};
+
+    start_with_tcp(all, COUNT(all));
+    ASK(0, 1, 0, WRITE);
+    ON_LINE(0, 0, WRITE);
+    AT_DEVICE(0, WRITE, WRITE);
+    SILENT(b.sockets[0]);
+    ASK(0, 2, 0, WRITE);
+    ON_LINE(0, 0, WRITE);
+    AT_DEVICE(0, WRITE, "\x86\x02");
+    SILENT(b.sockets[0]);
+    ASK(0, 3, 0, WRITE);
+    ON_LINE(0, 0, WRITE);
+    at_device(0, WRITE, sizeof WRITE - 1, NULL, 0);
+    SILENT(b.sockets[0]);
+    assert_int_equal(mbm_gateway_pending(&b.gateway, 0), 0);
+    ASK(0, 4, 1, READ);
+    AT_DEVICE(1, READ, VALUE);
+    EXPECT(0, 4, 1, VALUE);
+}

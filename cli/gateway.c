@@ -536,7 +536,8 @@ static const struct argp parser = {
         "LISTEN is where clients connect: tcp://:502, or tcp://ADDRESS:PORT for one address of this "
         "machine; with port 0 it is a free one. mbm prints \"ready PORT\" once it listens.\n\n"
         "UNITS are the unit ids of the LINE before: FIRST-LAST, or FIRST-LAST=UNIT if the unit FIRST of "
-        "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts.\n\n"
+        "clients is UNIT on the line. Several ranges have commas between them. 0=0 passes broadcasts. On a "
+        "line tcp:// 0 is a unit that answers: 5=0 leads there.\n\n"
         "Examples:\n\n"
         "  mbm gateway tcp://:502 rtu:/dev/ttyUSB0 1-31 tcp://192.168.0.7 101-131=1\n"
         "  mbm gateway gateway.yaml --metrics 127.0.0.1:9100\n\n" SERVICE_HELP

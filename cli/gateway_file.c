@@ -71,14 +71,16 @@ static const char *add_route(gateway_setup *to, const char *text)
         return "units are FIRST-LAST or FIRST-LAST=UNIT, from 0 to 255, such as 1-31 or 101-131=1";
     if (first > last)
         return "the first unit of a range is above its last one";
-    if (unit == 0 && first > 0)
-        return "0 on a line is a broadcast, which no device answers: only 0 of clients leads there, "
-               "as 0=0";
+    if (unit == 0 && first > 0 && to->lines[to->line_count - 1].place.framing != MBM_FRAMING_TCP)
+        return "0 on a line is a broadcast, which no device answers, except on a line tcp://. "
+               "Elsewhere only 0 of clients leads there, as 0=0";
     if (unit + last - first > 255)
         return "the last unit of the range would be above 255 on the line";
     for (i = 0; i < to->route_count; i++)
         if (first <= to->routes[i].last && last >= to->routes[i].first)
             return "a range before has one of these units";
+    if (unit == 0 && first > 0)
+        unit = MBM_GATEWAY_UNIT_0;
     to->routes[to->route_count++] = (mbm_gatewayRoute){
         (uint16_t)first, (uint16_t)last, (uint8_t)(to->line_count - 1), (uint16_t)unit};
     return NULL;

@@ -7,7 +7,7 @@ use mbm::error::Status;
 use mbm::frame::tcp;
 use mbm::gateway::{
     ConnectionState, Gateway, GatewayStorage, LineState, RequestResult, Route, Transaction,
-    ALL_LINES, LOCAL,
+    ALL_LINES, LOCAL, NO_RESPONSE, UNIT_0,
 };
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
@@ -16,7 +16,10 @@ const CONNECTIONS: usize = 4;
 const REQUESTS: usize = 9;
 const LINES: usize = 2;
 
-const ROUTES: [Route; 4] = [
+/// The line with TCP frames: its unit 0 answers.
+const TCP_LINE: u8 = 1;
+
+const ROUTES: [Route; 5] = [
     Route {
         first: 1,
         last: 9,
@@ -26,8 +29,14 @@ const ROUTES: [Route; 4] = [
     Route {
         first: 11,
         last: 19,
-        line: 1,
+        line: TCP_LINE,
         unit: 1,
+    },
+    Route {
+        first: 100,
+        last: 100,
+        line: TCP_LINE,
+        unit: UNIT_0,
     },
     Route {
         first: 200,
@@ -159,7 +168,10 @@ impl GatewayStorage for World {
             let result = RequestResult {
                 status: held.status,
                 exception,
-                length: if held.unit == 0 { 0 } else { 4 },
+                length: match held.unit == 0 && line != TCP_LINE {
+                    true => NO_RESPONSE,
+                    false => 4,
+                },
             };
             self.ended.insert(held.request, result);
             false
@@ -204,7 +216,7 @@ impl GatewayStorage for World {
             self.frames[usize::from(request)][1],
         ]);
         self.starts.push((usize::from(transaction >> 12), line));
-        self.broadcasts += usize::from(unit == 0);
+        self.broadcasts += usize::from(unit == 0 && line != TCP_LINE);
         self.ended.remove(&request);
         let status = match self.random(8) {
             0 => Status::RESPONSE_TIMED_OUT,
@@ -333,6 +345,7 @@ fn every_response_belongs_to_a_request_of_its_connection() {
                 0 => 0,
                 1 => 200,
                 2 => 77,
+                3 => 100,
                 more if more % 2 == 0 => 1 + more as u8 % 9,
                 more => 11 + more as u8 % 9,
             };

@@ -23,6 +23,8 @@ struct mbm_unit;
 #define MBM_GATEWAY_ALL_LINES 255u
 /** The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits. */
 #define MBM_GATEWAY_LOCAL 254u
+/** The `unit` of a route whose first unit id is 0 on the line, but not on TCP. */
+#define MBM_GATEWAY_UNIT_0 256u
 
 /**
  * A gateway: takes requests from Modbus TCP connections, passes each to the line of its unit,
@@ -50,8 +52,11 @@ typedef struct mbm_gateway {
  * - {101, 131, 1, 1}: the units 101 to 131, which have the ids 1 to 31 on line 1
  * - {255, 255, 0, 5}: a client that addresses the gateway itself reaches unit 5 on line 0
  *   (messaging on TCP/IP guide V1.0b, 4.4.1.2). The same with 0 instead of 255
- * - {0, 0, 0, 0}: unit 0 is a broadcast on line 0 (serial line guide V1.02, 2.1)
- * - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line
+ * - {0, 0, 0, 0}: unit 0 is a broadcast on line 0 (serial line guide V1.02, 2.1). If line 0 has
+ *   TCP frames, unit 0 is a unit there and answers
+ * - {5, 5, 1, MBM_GATEWAY_UNIT_0}: unit 5 is unit 0 on line 1, which has TCP frames
+ * - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line. On a line with TCP
+ *   frames it goes to unit 0, and the gateway drops the response
  */
 typedef struct mbm_gatewayRoute {
     /** The first unit id on TCP, 0 to 255. mbm_gateway_begin refuses a greater number. */
@@ -61,8 +66,9 @@ typedef struct mbm_gatewayRoute {
     /** The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL. */
     uint8_t line;
     /** The id on the line of the unit that is `first` on TCP; the units after it follow, up to
-     *  255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
-     *  is a broadcast. */
+     *  255. 0: the ids on the line are those on TCP. MBM_GATEWAY_UNIT_0: `first` has the id 0 on
+     *  the line. A request whose unit id on the line is 0 is a broadcast, except on a line
+     *  with TCP frames (mbm_client_beginTcp): there unit 0 is a unit. */
     uint16_t unit;
 } mbm_gatewayRoute;
 
@@ -138,7 +144,8 @@ typedef struct mbm_gatewayConfig {
  *                must be used by this gateway only, for as long as the gateway is used; lines,
  *                connections and requests are initialised with MBM_INIT
  * @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
- *         that does not exist or to a unit id above 255, and a line without client;
+ *         that does not exist or to a unit id above 255, unless it is MBM_GATEWAY_UNIT_0, and
+ *         a line without client;
  *         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a
  *         hook of a client of its lines
  */

@@ -2,11 +2,8 @@
 
 use super::object::{Gateway, PATH_UNAVAILABLE, TARGET_FAILED};
 use super::state::Stage;
-use super::storage::{GatewayStorage, RequestResult};
+use super::storage::{GatewayStorage, RequestResult, NO_RESPONSE};
 use crate::error::Status;
-use crate::frame::tcp;
-use crate::pdu::diagnostics::sub_function::FORCE_LISTEN_ONLY;
-use crate::pdu::functions::DIAGNOSTICS;
 use crate::time::elapsed;
 
 impl<S: GatewayStorage> Gateway<S> {
@@ -31,12 +28,10 @@ impl<S: GatewayStorage> Gateway<S> {
 
     /// Answers a request that has ended on its line.
     fn end(&mut self, request: u16, result: RequestResult) {
-        let is_broadcast = self.storage.request(request).unit == 0;
-        if is_broadcast {
-            return self.end_broadcast(request);
-        }
+        let is_for_all = self.storage.request(request).is_for_all;
         match result.status {
-            Status::OK if is_unanswered(self.storage.frame(request)) => self.release(request),
+            Status::OK if result.length == NO_RESPONSE => self.end_broadcast(request),
+            _ if is_for_all => self.end_broadcast(request),
             Status::OK => self.answer(request, result.length + 1),
             _ if result.exception != 0 => self.refuse(request, result.exception),
             Status::LINK_LOST
@@ -156,14 +151,5 @@ impl<S: GatewayStorage> Gateway<S> {
         let now = self.storage.now(connection);
         let since = self.storage.request(request).since;
         self.queue_time.saturating_sub(elapsed(now, since))
-    }
-}
-
-/// True for 08 with sub-function 04, Force Listen Only Mode: no device responds to it
-/// (V1.1b3, 6.8.1).
-fn is_unanswered(frame: &[u8]) -> bool {
-    match frame.get(tcp::PDU..tcp::PDU + 3) {
-        Some(&[DIAGNOSTICS, high, low]) => u16::from_be_bytes([high, low]) == FORCE_LISTEN_ONLY,
-        _ => false,
     }
 }

@@ -19,6 +19,6 @@ mod state;
 mod storage;
 
 pub use object::Gateway;
-pub use route::{Destination, Route, ALL_LINES, LOCAL};
+pub use route::{Destination, Route, ALL_LINES, LOCAL, UNIT_0};
 pub use state::{ConnectionState, LineState, Transaction};
-pub use storage::{GatewayStorage, RequestResult};
+pub use storage::{GatewayStorage, RequestResult, NO_RESPONSE};

@@ -6,6 +6,9 @@ pub const ALL_LINES: u8 = 0xFF;
 /// [`Route::line`] of units that the gateway serves itself.
 pub const LOCAL: u8 = 0xFE;
 
+/// [`Route::unit`] of a range that begins with unit 0 on its line, but with another id on TCP.
+pub const UNIT_0: u16 = 0x100;
+
 /// A range of unit ids on TCP, and where requests for them go.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -17,7 +20,7 @@ pub struct Route {
     /// The index of the line, [`ALL_LINES`] or [`LOCAL`].
     pub line: u8,
     /// The unit on the line that has the id `first` on TCP; the units after it follow. 0: the
-    /// ids on the line are those on TCP.
+    /// ids on the line are those on TCP. [`UNIT_0`]: `first` is unit 0 on the line.
     pub unit: u16,
 }
 
@@ -26,7 +29,7 @@ pub struct Route {
 pub struct Destination {
     /// As [`Route::line`].
     pub line: u8,
-    /// The unit id there. 0 on a line is a broadcast.
+    /// The unit id there. 0 is a broadcast, except on a line with TCP frames.
     pub unit: u8,
 }
 
@@ -38,7 +41,8 @@ impl Route {
         if self.last > LAST || self.first > self.last {
             return false;
         }
-        let exist = self.unit <= LAST - (self.last - self.first);
+        let exist =
+            u16::from(self.unit as u8) + (self.last - self.first) <= LAST && self.unit <= UNIT_0;
         match self.line {
             ALL_LINES => self.last == 0 && self.unit == 0,
             LOCAL => exist,
@@ -92,6 +96,16 @@ mod tests {
     }
 
     #[test]
+    fn a_range_may_begin_with_unit_0_on_its_line() {
+        let routes = [route(5, 8, 1, UNIT_0), route(0, 0, 0, 0)];
+        let found = |unit| Route::find(&routes, unit).map(|found| (found.line, found.unit));
+        assert_eq!(found(5), Some((1, 0)));
+        assert_eq!(found(8), Some((1, 3)));
+        assert_eq!(found(0), Some((0, 0)));
+        assert_eq!(found(9), None);
+    }
+
+    #[test]
     fn a_route_that_leads_nowhere_is_invalid() {
         assert!(route(1, 247, 0, 0).is_valid(1));
         assert!(route(0, 255, 0, 0).is_valid(1));
@@ -105,7 +119,11 @@ mod tests {
         assert!(route(1, 1, LOCAL, 0).is_valid(0));
         assert!(!route(300, 300, 0, 0).is_valid(1));
         assert!(!route(1, 256, 0, 0).is_valid(1));
-        assert!(!route(1, 1, 0, 256).is_valid(1));
+        assert!(route(5, 5, 0, UNIT_0).is_valid(1));
+        assert!(route(0, 255, 0, UNIT_0).is_valid(1));
+        assert!(!route(5, 5, 0, UNIT_0 + 1).is_valid(1));
+        assert!(!route(0, 0, ALL_LINES, UNIT_0).is_valid(1));
+        assert!(!route(5, 256, 0, UNIT_0).is_valid(1));
         assert!(!route(1, 1, LOCAL, 300).is_valid(1));
     }
 }

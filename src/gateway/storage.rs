@@ -4,6 +4,11 @@ use super::route::Route;
 use super::state::{ConnectionState, LineState, Transaction};
 use crate::error::Status;
 
+/// [`RequestResult::length`] of a request that no device answers: a broadcast, which is a request
+/// for unit 0 except in TCP frames (serial line guide V1.02, 2.1; messaging on TCP/IP guide V1.0b,
+/// 4.4.1.2), and 08 with sub-function 04, Force Listen Only Mode (V1.1b3, 6.8.1).
+pub const NO_RESPONSE: u16 = u8::MAX as u16;
+
 /// The result of a request on its line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RequestResult {
@@ -11,7 +16,7 @@ pub struct RequestResult {
     pub status: Status,
     /// The exception code of the reply; 0 if it was none.
     pub exception: u8,
-    /// Bytes of the reply after the function code. They are in the frame at
+    /// Bytes of the reply after the function code, or [`NO_RESPONSE`]. They are in the frame at
     /// [`BODY`](GatewayStorage::BODY).
     pub length: u16,
 }

@@ -137,6 +137,29 @@ def test_a_port_in_use_is_refused(plain):
         plain.fails(LINE, "Another program listens there", "gateway", f"tcp://127.0.0.1:{other.getsockname()[1]}", NOWHERE, "1-9")
 
 
+def test_unit_0_of_a_device_over_tcp_answers_and_on_a_serial_line_it_stays_a_broadcast(plain, libmodbus):
+    """pymodbus's server has unit 0 only. libmodbus's on the serial line carries broadcasts out."""
+    from pymodbus.client import ModbusTcpClient
+
+    device = pymodbus("tcp", "--port", "0", "--unit", 0).ready[0]
+    gateway = plain.begin("gateway", LISTEN, libmodbus.rtu, "17,0=0", f"tcp://127.0.0.1:{device}", "5=0,1", f"rtu+tcp://127.0.0.1:{device}", "9")
+    client, peer = Client(gateway.last_word()), ModbusTcpClient("127.0.0.1", port=int(gateway.last_word()), timeout=PATIENCE)
+    assert peer.read_holding_registers(100, count=2, device_id=5).registers == [word(100), word(101)]
+    assert not peer.write_register(100, 4321, device_id=5).isError()
+    assert peer.read_holding_registers(100, count=1, device_id=5).registers == [4321]
+    assert peer.read_holding_registers(60000, count=1, device_id=5).exception_code == 2
+    peer.close()
+    # The broadcast has no response, and 17 has its value when it answers.
+    client.send(0, b"\6\0\xb4\x12\x34")
+    assert client.ask(17, read_of(180)) == number(0x1234)
+    assert client.ask(0, read_of(180)) == b"\x83\1"
+    other = plain.begin("gateway", LISTEN, f"tcp://127.0.0.1:{device}", "0-9")
+    client = Client(other.last_word())
+    assert client.ask(0, read_of(7)) == holds(7)
+    assert client.ask(0, b"\6\0\xb4\x12\x34") == b"\6\0\xb4\x12\x34"
+    assert client.ask(0, read_of(180)) == number(0x1234)
+
+
 # --- system calls
 
 @pytest.fixture

@@ -205,6 +205,8 @@ gateway tcp://127.0.0.1:0 rtu:/dev/null 1-9,x|UNITS "1-9,x": units are FIRST-LAS
 gateway tcp://127.0.0.1:0 rtu:/dev/null 9-1|the first unit of a range is above its last one
 gateway tcp://127.0.0.1:0 rtu:/dev/null 1-9=250|the last unit of the range would be above 255
 gateway tcp://127.0.0.1:0 rtu:/dev/null 1=0|UNITS "1=0": 0 on a line is a broadcast, which no device answers
+gateway tcp://127.0.0.1:0 rtu+tcp://127.0.0.1:1 1=0|0 on a line is a broadcast, which no device answers, except on a line tcp://
+gateway tcp://127.0.0.1:0 tcp://127.0.0.1 5=0,5|a range before has one of these units
 gateway tcp://127.0.0.1:0 rtu:/dev/null 0=0,5-9=0|UNITS "0=0,5-9=0": 0 on a line is a broadcast
 gateway tcp://127.0.0.1:0 rtu:/dev/null 1-9 rtu:/dev/zero 9|a range before has one of these units
 gateway tcp://127.0.0.1:0 rtu:/dev/null 1-9 rtu:/dev/null 10|the line rtu:/dev/null is there twice

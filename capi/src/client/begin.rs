@@ -203,11 +203,3 @@ pub unsafe extern "C" fn mbm_client_setInFlight(client: *mut mbm_client, most: u
         _ => Status::INVALID_ARGUMENT,
     })
 }
-
-/// True if the client's frames are those of TCP; false if it was never begun.
-///
-/// # Safety
-/// The client is NULL or storage, zeroed or begun.
-pub(crate) unsafe fn has_tcp_frames(client: *const mbm_client) -> bool {
-    pointers::read(client, false, |object| (*object).queue.has_transaction_ids)
-}

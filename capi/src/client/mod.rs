@@ -15,7 +15,6 @@ mod storage;
 mod tolerance;
 mod units;
 
-pub(crate) use begin::has_tcp_frames;
 pub use begin::*;
 pub use identification::*;
 pub use link::*;

@@ -55,7 +55,8 @@ c_object! { mbm_gateway, *mut Core, core }
 ///                must be used by this gateway only, for as long as the gateway is used; lines,
 ///                connections and requests are initialised with MBM_INIT
 /// @return a status; MBM_INVALID_ARGUMENT for fewer requests than connections, a route to a line
-///         that does not exist or to a unit id above 255, and a line without client;
+///         that does not exist or to a unit id above 255, unless it is MBM_GATEWAY_UNIT_0, and
+///         a line without client;
 ///         MBM_NOT_INITIALISED if the client of a line was not begun; MBM_BUSY also from within a
 ///         hook of a client of its lines
 #[no_mangle]

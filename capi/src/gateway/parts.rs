@@ -9,12 +9,15 @@ use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::from_raw_parts;
 use mbm::error::Status;
-use mbm::gateway::{ConnectionState, LineState, Route, Transaction, ALL_LINES, LOCAL};
+use mbm::gateway::{ConnectionState, LineState, Route, Transaction, ALL_LINES, LOCAL, UNIT_0};
 
 /// The `line` of a route for broadcasts: to all lines, one after the other.
 pub const MBM_GATEWAY_ALL_LINES: u8 = 0xFF;
 /// The `line` of a route to the gateway's own units: see mbm_gateway_serveUnits.
 pub const MBM_GATEWAY_LOCAL: u8 = 0xFE;
+
+/// The `unit` of a route whose first unit id is 0 on the line, but not on TCP.
+pub const MBM_GATEWAY_UNIT_0: u16 = 0x100;
 
 /// Leads requests for a range of unit ids on TCP to a line. A table of routes may be constant.
 /// The first route that has the unit id counts. Examples:
@@ -23,8 +26,11 @@ pub const MBM_GATEWAY_LOCAL: u8 = 0xFE;
 /// - {101, 131, 1, 1}: the units 101 to 131, which have the ids 1 to 31 on line 1
 /// - {255, 255, 0, 5}: a client that addresses the gateway itself reaches unit 5 on line 0
 ///   (messaging on TCP/IP guide V1.0b, 4.4.1.2). The same with 0 instead of 255
-/// - {0, 0, 0, 0}: unit 0 is a broadcast on line 0 (serial line guide V1.02, 2.1)
-/// - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line
+/// - {0, 0, 0, 0}: unit 0 is a broadcast on line 0 (serial line guide V1.02, 2.1). If line 0 has
+///   TCP frames, unit 0 is a unit there and answers
+/// - {5, 5, 1, MBM_GATEWAY_UNIT_0}: unit 5 is unit 0 on line 1, which has TCP frames
+/// - {0, 0, MBM_GATEWAY_ALL_LINES, 0}: unit 0 is a broadcast on each line. On a line with TCP
+///   frames it goes to unit 0, and the gateway drops the response
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct mbm_gatewayRoute {
@@ -35,8 +41,9 @@ pub struct mbm_gatewayRoute {
     /// The index of the line, MBM_GATEWAY_ALL_LINES or MBM_GATEWAY_LOCAL.
     pub line: u8,
     /// The id on the line of the unit that is `first` on TCP; the units after it follow, up to
-    /// 255. 0: the ids on the line are those on TCP. A request whose unit id on the line is 0
-    /// is a broadcast.
+    /// 255. 0: the ids on the line are those on TCP. MBM_GATEWAY_UNIT_0: `first` has the id 0 on
+    /// the line. A request whose unit id on the line is 0 is a broadcast, except on a line
+    /// with TCP frames (mbm_client_beginTcp): there unit 0 is a unit.
     pub unit: u16,
 }
 
@@ -113,6 +120,7 @@ pub struct mbm_gatewayConfig {
 const _: () = {
     assert!(MBM_GATEWAY_ALL_LINES == ALL_LINES);
     assert!(MBM_GATEWAY_LOCAL == LOCAL);
+    assert!(MBM_GATEWAY_UNIT_0 == UNIT_0);
     assert!(size_of::<mbm_gatewayRoute>() == size_of::<Route>());
     assert!(offset_of!(mbm_gatewayRoute, first) == offset_of!(Route, first));
     assert!(offset_of!(mbm_gatewayRoute, last) == offset_of!(Route, last));

@@ -2,8 +2,8 @@
 
 use super::parts::{mbm_gatewayConfig, mbm_gatewayConnection, mbm_gatewayLine, mbm_gatewayRequest};
 use crate::client::{
-    self, forward, has_tcp_frames, mbm_client, mbm_clientRequest, mbm_client_cancel,
-    mbm_client_poll, mbm_client_pollDelay,
+    self, forward, mbm_client, mbm_clientRequest, mbm_client_cancel, mbm_client_poll,
+    mbm_client_pollDelay,
 };
 use crate::framing::MBM_MAX_TCP_FRAME;
 use crate::functions::mbm_function;
@@ -12,7 +12,9 @@ use crate::server::mbm_unit;
 use core::ffi::c_void;
 use core::slice::from_raw_parts_mut;
 use mbm::error::Status;
-use mbm::gateway::{ConnectionState, GatewayStorage, LineState, RequestResult, Route, Transaction};
+use mbm::gateway::{
+    ConnectionState, GatewayStorage, LineState, RequestResult, Route, Transaction, NO_RESPONSE,
+};
 use mbm::port::Port as _;
 
 /// Bytes of a frame before the body: the header and the function code.
@@ -186,23 +188,22 @@ impl GatewayStorage for Parts {
         unsafe {
             let frame = mbm_gatewayRequest::frame(place);
             let body = frame.add(BODY);
-            // A gateway's unit 0 is a broadcast, and a TCP stream has none.
-            if unit == 0 && has_tcp_frames(client) {
-                return Status::BROADCAST_NOT_ALLOWED;
-            }
             let request = &raw mut (*place).request;
             (*request).unit = unit.into();
             (*request).data = body.cast();
             (*request).reply = body.cast();
             (*request).replyBytes = MBM_MAX_TCP_FRAME - BODY as u16;
-            if let Some(forward) = self.forward_declared {
-                if let Some(status) = forward(self, client, request, frame, length) {
-                    return status;
-                }
-            }
-            let function = *frame.add(BODY - 1);
-            let queued = forward::<false>(client, request, function, body, length);
-            Status::from_code(queued)
+            let declared = match self.forward_declared {
+                Some(forward) => forward(self, client, request, frame, length),
+                None => None,
+            };
+            let status = declared.unwrap_or_else(|| {
+                let function = *frame.add(BODY - 1);
+                Status::from_code(forward::<false>(client, request, function, body, length))
+            });
+            // Only a response changes it.
+            (*request).length = NO_RESPONSE as u8;
+            status
         }
     }
 
