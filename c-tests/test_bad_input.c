@@ -21,6 +21,16 @@ static void all_others_answer(mbm_line *l, mbm_node *m, uint8_t status)
     IS(status, mbm_node_send(m, 1));
     IS(status, mbm_node_send(m, 1));
     IS(status, mbm_node_sendBit(m, 1));
+    IS(status, mbm_node_send8(m, 1));
+    IS(status, mbm_node_send32(m, 1));
+    IS(status, mbm_node_setTransmitBuffer(m, 0, 1));
+    IS(status, mbm_node_clearTransmitBuffer(m));
+    IS(status, mbm_node_clearResponseBuffer(m));
+    IS(status, mbm_node_idle(m, NULL));
+    IS(status, mbm_node_preTransmission(m, NULL));
+    IS(status, mbm_node_postTransmission(m, NULL));
+    assert_int_equal(mbm_node_getResponseBuffer(m, 0), 0xFFFF);
+    assert_int_equal(mbm_node_requestFrom(m, 0, 1), 0);
     assert_int_equal(mbm_node_getExceptionCode(m), 0);
     assert_int_equal(mbm_node_getSlaveID(m), 0);
     assert_int_equal(mbm_node_available(m), 0);

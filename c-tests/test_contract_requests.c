@@ -34,6 +34,110 @@ SIM_TEST(words_that_the_program_changes_leave_the_indices_alone)
     LAST("11 10 00 03 00 02 04 00 00 22 22 +");
 }
 
+SIM_TEST(get_response_buffer_returns_ffff_past_the_end)
+{
+    OK(mbm_node_clearResponseBuffer(n));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 124), 0);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 125), 0xFFFF);
+    assert_int_equal(mbm_node_getResponseBuffer(n, 255), 0xFFFF);
+}
+
+SIM_TEST(set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue)
+{
+    OK(mbm_node_beginTransmission(n, 7));
+    OK(mbm_node_setTransmitBuffer(n, 122, 1));
+    IS(2, mbm_node_setTransmitBuffer(n, 123, 1));
+    IS(2, mbm_node_setTransmitBuffer(n, 255, 1));
+    OK(mbm_node_setTransmitBuffer(n, 0, 0xAAAA));
+    OK(mbm_node_send(n, 0xBBBB));
+    sim_answer(s, 1, 100, "11 10 00 07 00 01 +");
+    OK(mbm_node_writeQueuedRegisters(n));
+    LAST("11 10 00 07 00 01 02 BB BB +");
+}
+
+SIM_TEST(clearing_the_buffers_leaves_the_indices_alone)
+{
+    sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
+    OK(mbm_node_readHoldingRegisters(n, 0, 2));
+    assert_int_equal(mbm_node_receive(n), 1);
+    OK(mbm_node_clearResponseBuffer(n));
+    assert_int_equal(mbm_node_available(n), 1);
+    assert_int_equal(mbm_node_receive(n), 0);
+    OK(mbm_node_beginTransmission(n, 3));
+    OK(mbm_node_send(n, 0x1111));
+    OK(mbm_node_clearTransmitBuffer(n));
+    OK(mbm_node_send(n, 0x2222));
+    sim_answer(s, 1, 100, "11 10 00 03 00 02 +");
+    OK(mbm_node_writeQueuedRegisters(n));
+    LAST("11 10 00 03 00 02 04 00 00 22 22 +");
+}
+
+SIM_TEST(response_words_survive_a_failure_and_transmit_words_every_request)
+{
+    sim_answer(s, 1, 100, "11 03 04 12 34 56 78 +");
+    OK(mbm_node_readHoldingRegisters(n, 0, 2));
+    OK(mbm_node_setTransmitBuffer(n, 1, 0x4711));
+    sim_answer(s, 1, 100, "11 83 02 +");
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 2));
+    assert_int_equal(mbm_node_getResponseBuffer(n, 1), 0x5678);
+    sim_answer(s, 1, 100, "11 10 00 09 00 02 +");
+    OK(mbm_node_writeMultipleRegisters(n, 9, 2));
+    LAST("11 10 00 09 00 02 04 00 00 47 11 +");
+}
+
+SIM_TEST(request_from_returns_how_many_words_receive_will_return)
+{
+    sim_answer(s, 1, 100, "11 03 04 AB CD 00 07 +");
+    assert_int_equal(mbm_node_requestFrom(n, 6, 2), 2);
+    LAST("11 03 00 06 00 02 +");
+    assert_int_equal(mbm_node_available(n), 2);
+    assert_int_equal(mbm_node_receive(n), 0xABCD);
+    assert_int_equal(mbm_node_receive(n), 7);
+    assert_int_equal(mbm_node_receive(n), 0xFFFF);
+    sim_answer(s, 1, 100, "11 83 02 +");
+    assert_int_equal(mbm_node_requestFrom(n, 6, 1), 0);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_status(n));
+    assert_int_equal(mbm_node_requestFrom(n, 0, 126), 0);
+    assert_int_equal(mbm_node_requestFrom(n, 65535, 2), 0);
+}
+
+SIM_TEST(request_from_returns_0_while_a_request_is_pending)
+{
+    sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
+    OK(mbm_node_readHoldingRegisters(n, 0, 2));
+    OK(mbm_node_setBlocking(n, 0));
+    /* Its own request, which does not wait, and a second one. */
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
+    IS(MBM_PENDING, mbm_node_status(n));
+    assert_int_equal(mbm_node_requestFrom(n, 0, 1), 0);
+    OK(mbm_node_cancel(n));
+}
+
+SIM_TEST(send_queues_bytes_words_and_numbers_of_32_bits_with_the_low_word_first)
+{
+    OK(mbm_node_beginTransmission(n, 0x100));
+    OK(mbm_node_send(n, 0x1234));
+    OK(mbm_node_send8(n, 0xAB));
+    OK(mbm_node_sendBit(n, 1));
+    OK(mbm_node_send32(n, 0xDEADBEEF)); /* begins a word after the bit */
+    sim_answer(s, 1, 100, "11 10 01 00 00 05 +");
+    OK(mbm_node_writeQueuedRegisters(n));
+    LAST("11 10 01 00 00 05 0A 12 34 00 AB 00 01 BE EF DE AD +");
+}
+
+SIM_TEST(a_number_of_32_bits_is_queued_with_both_words_or_none)
+{
+    OK(mbm_node_beginTransmission(n, 0));
+    for (uint8_t i = 0; i < 122; i++)
+        OK(mbm_node_send8(n, i));
+    s->transmit[122] = 0x5555;
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send32(n, 0x00020003));
+    assert_int_equal(s->transmit[122], 0x5555);
+    OK(mbm_node_send8(n, 9));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send8(n, 1));
+    assert_int_equal(s->transmit[122], 9);
+}
+
 SIM_TEST(begin_transmission_empties_the_queue_and_keeps_the_words)
 {
     mbm_node_beginTransmission(n, 1);

@@ -41,7 +41,6 @@ static void play_row(sim *s, int has_client, const exchange *e, const uint16_t *
     const unsigned before = s->sent;
 
     (void)exchange_words(sent, e->words);
-    memcpy(s->transmit, sent, sizeof s->transmit);
     memset(received, UNTOUCHED & 0xFF, sizeof received);
     memset(s->response, UNTOUCHED & 0xFF, sizeof s->response);
     if (e->reply)
@@ -50,12 +49,21 @@ static void play_row(sim *s, int has_client, const exchange *e, const uint16_t *
         IS(e->status, client_ends(s, e));
         assert_int_equal(request.exception, e->exception);
     } else {
+        const uint16_t before_it = mbm_node_getResponseBuffer(&s->node, 0);
+
+        OK(mbm_node_clearTransmitBuffer(&s->node));
+        for (uint8_t i = 0; i < MBM_MAX_WRITE_REGISTERS; i++)
+            OK(mbm_node_setTransmitBuffer(&s->node, i, sent[i]));
         OK(mbm_node_setSlaveID(&s->node, exchange_unit(e)));
         IS(e->status, node_calls(&s->node, e));
         IS(e->status, mbm_node_status(&s->node));
         assert_int_equal(mbm_node_getExceptionCode(&s->node), e->exception);
         if (e->response)
             assert_int_equal(mbm_node_available(&s->node), count);
+        else
+            assert_int_equal(mbm_node_getResponseBuffer(&s->node, 0), before_it);
+        for (uint8_t i = 0; i < count; i++)
+            assert_int_equal(mbm_node_getResponseBuffer(&s->node, i), wanted[i]);
     }
     if (e->request && !e->request[0])
         assert_int_equal(s->sent, before);

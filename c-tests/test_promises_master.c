@@ -177,6 +177,73 @@ TEST(words_end_where_their_buffers_end)
     assert_true((transmit[0] & 1) == 1 && transmit[1] == 5);
 }
 
+TEST(words_have_indices_up_to_the_ends_of_their_buffers)
+{
+    assert_int_equal(mbm_node_getResponseBuffer(&m, 0), 0x5555);
+    OK(mbm_node_clearResponseBuffer(&m));
+    OK(mbm_node_clearTransmitBuffer(&m));
+    for (unsigned i = 0; i < 256; i++) {
+        const uint8_t index = (uint8_t)i;
+
+        assert_int_equal(mbm_node_getResponseBuffer(&m, index), i < RESPONSE ? 0 : 0xFFFF);
+        IS(i < TRANSMIT ? MBM_OK : MBM_ILLEGAL_DATA_ADDRESS,
+           mbm_node_setTransmitBuffer(&m, index, (uint16_t)i));
+        if (i < TRANSMIT)
+            assert_int_equal(transmit[i], i);
+    }
+    OK(mbm_node_send8(&m, 255));
+    OK(mbm_node_send32(&m, 0xFFFE1234));
+    assert_true(transmit[0] == 255 && transmit[1] == 0x1234 && transmit[2] == 0xFFFE);
+    /* A node without words. */
+    OK(mbm_node_begin(&m, &line, 17, NULL, 0, NULL, 0));
+    assert_int_equal(mbm_node_getResponseBuffer(&m, 0), 0xFFFF);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_setTransmitBuffer(&m, 0, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send8(&m, 1));
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send32(&m, 1));
+    OK(mbm_node_clearResponseBuffer(&m));
+    OK(mbm_node_clearTransmitBuffer(&m));
+    assert_int_equal(mbm_node_requestFrom(&m, 0, 1), 0);
+    IS(MBM_PENDING, mbm_node_status(&m));
+}
+
+static void nothing(void) {}
+
+TEST(callbacks_have_the_rules_of_the_header)
+{
+    static mbm_nodeCallbacks callbacks, never;
+    static const mbm_nodeCallbacks zero;
+    mbm_port lacking = port;
+
+    memset(&callbacks, 0, sizeof callbacks);
+    assert_null(mbm_nodeCallbacks_port(NULL));
+    assert_null(mbm_nodeCallbacks_port(&never));
+    IS(MBM_INVALID_ARGUMENT, mbm_nodeCallbacks_begin(NULL, &port));
+    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, NULL));
+    lacking.read = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
+    lacking = port;
+    lacking.write = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
+    lacking = port;
+    lacking.micros = NULL;
+    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
+    assert_memory_equal(&callbacks, &zero, sizeof zero);
+    /* A line without them, and one without a port. */
+    REFUSED(MBM_NOT_INITIALISED, line, mbm_node_idle(&m, nothing));
+    REFUSED(MBM_NOT_INITIALISED, line, mbm_node_preTransmission(&m, nothing));
+    REFUSED(MBM_NOT_INITIALISED, line, mbm_node_postTransmission(&m, NULL));
+    OK(mbm_nodeCallbacks_begin(&callbacks, &port));
+    REFUSED(MBM_INVALID_ARGUMENT, callbacks,
+            mbm_nodeCallbacks_begin(&callbacks, mbm_nodeCallbacks_port(&callbacks)));
+    OK(mbm_line_beginRtu(&line, mbm_nodeCallbacks_port(&callbacks), frame, sizeof frame));
+    OK(mbm_node_idle(&m, nothing));
+    OK(mbm_node_preTransmission(&m, nothing));
+    OK(mbm_node_postTransmission(&m, nothing));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&m, 0, 1));
+    OK(mbm_node_idle(&m, NULL));
+    IS(MBM_RESPONSE_TIMED_OUT, run());
+}
+
 TEST(the_words_of_a_read_are_received_once)
 {
     IS(MBM_PENDING, read_holding(0, 2));

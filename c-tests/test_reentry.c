@@ -65,6 +65,10 @@ static void its_request_is_busy(void)
     assert_int_equal(mbm_node_pollDelay(&master), 0);
     IS(MBM_BUSY, mbm_node_cancel(&master));
     IS(MBM_BUSY, mbm_node_status(&master));
+    IS(MBM_BUSY, mbm_node_idle(&master, NULL));
+    IS(MBM_BUSY, mbm_node_preTransmission(&master, NULL));
+    IS(MBM_BUSY, mbm_node_postTransmission(&master, NULL));
+    assert_int_equal(mbm_node_requestFrom(&master, 0, 1), 0);
 }
 
 /* A node's own words and settings may be used. */
@@ -77,6 +81,12 @@ static void its_words_and_settings_are_free(void)
     OK(mbm_node_setResponseTimeout(m, 2000));
     OK(mbm_node_beginTransmission(m, 1));
     OK(mbm_node_send(m, 0x77));
+    OK(mbm_node_send8(m, 0x78));
+    OK(mbm_node_send32(m, 0x79));
+    OK(mbm_node_clearTransmitBuffer(m));
+    OK(mbm_node_setTransmitBuffer(m, 0, 0x77));
+    OK(mbm_node_clearResponseBuffer(m));
+    assert_int_equal(mbm_node_getResponseBuffer(m, 0), 0);
     assert_int_equal(mbm_node_getExceptionCode(m), 0);
     assert_int_equal(mbm_node_available(m), 0);
     assert_int_equal(mbm_node_receive(m), 0xFFFF);

@@ -233,6 +233,11 @@ impl PortRef {
         self.port = port;
     }
 
+    /// The port; NULL for none.
+    pub(super) const fn get(&self) -> *const mbm_port {
+        self.port
+    }
+
     /// Refers to no port, if it refers to `port`.
     pub(super) fn clear_if(&mut self, port: *const mbm_port) {
         if self.port == port {

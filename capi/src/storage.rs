@@ -50,6 +50,12 @@ impl NodeWords {
         unsafe { words(self.response, self.response_words) }
     }
 
+    /// The words that reads fill, to be changed.
+    pub(super) fn response_mut(&mut self) -> &mut [u16] {
+        // SAFETY: as the header of mbm_node_begin demands.
+        unsafe { words(self.response, self.response_words) }
+    }
+
     /// The words that writes send.
     pub(super) fn transmit(&mut self) -> &mut [u16] {
         // SAFETY: as the header of mbm_node_begin demands.

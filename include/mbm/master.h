@@ -53,6 +53,18 @@ typedef struct mbm_line {
 } mbm_line;
 
 /**
+ * The callbacks of a line, for mbm_node_idle, mbm_node_preTransmission and
+ * mbm_node_postTransmission. A program that sets the members of its mbm_port needs no such object.
+ *
+ * You provide the storage. Initialise it with MBM_INIT. Call mbm_nodeCallbacks_begin, then begin
+ * the line with mbm_nodeCallbacks_port instead of your port. The object must not move while its
+ * port is in use.
+ */
+typedef struct mbm_nodeCallbacks {
+    void *pointers[13]; /**< Private. */
+} mbm_nodeCallbacks;
+
+/**
  * Begins a line with RTU frames on a port.
  *
  * It may be called again, for another port or frame buffer, whenever no request is pending;
@@ -89,6 +101,17 @@ uint8_t mbm_line_beginRtu(mbm_line *line, const mbm_port *port, uint8_t *frame,
  */
 uint8_t mbm_node_begin(mbm_node *node, mbm_line *line, uint8_t unit, uint16_t *response,
                        uint16_t responseWords, uint16_t *transmit, uint16_t transmitWords);
+
+/**
+ * Puts callbacks before a port. At first there are none.
+ *
+ * It may be called again, for another port, whenever no request is pending. The callbacks stay.
+ *
+ * @param port  the port. It is not copied: it must stay valid and unchanged for as long as the
+ *              object is used. It must not be the port of these callbacks. Its hooks read, write
+ *              and micros are required
+ */
+uint8_t mbm_nodeCallbacks_begin(mbm_nodeCallbacks *callbacks, const mbm_port *port);
 
 /**
  * Sets the write address and empties the queue of mbm_node_send. The transmit words do not
@@ -272,6 +295,47 @@ uint8_t mbm_node_status(const mbm_node *node);
 uint8_t mbm_node_getExceptionCode(const mbm_node *node);
 
 /**
+ * Returns the port that calls the callbacks and passes everything on to the port behind them. Pass
+ * it to mbm_line_beginRtu.
+ *
+ * @return the port, which is valid for as long as the object is used; NULL if it was never begun:
+ *         mbm_line_beginRtu refuses that
+ */
+const mbm_port *mbm_nodeCallbacks_port(const mbm_nodeCallbacks *callbacks);
+
+/**
+ * Sets the callback that a blocking function calls again and again while it waits for a reply, or
+ * for the turnaround delay of a broadcast. It takes the place of the port's hook `idle`
+ * meanwhile. It may call every function, but one that starts a request returns MBM_BUSY.
+ *
+ * The callbacks are those of the line: all its nodes share them. To get an argument in a callback,
+ * set the members of your mbm_port instead.
+ *
+ * @param callback  the callback; NULL for none
+ * @return a status; MBM_NOT_INITIALISED also if the line was not begun with
+ *         mbm_nodeCallbacks_port
+ */
+uint8_t mbm_node_idle(mbm_node *node, void (*callback)(void));
+
+/**
+ * Sets the callback that is called before the first byte of a frame is sent, for example to switch
+ * an RS-485 driver on. It is called after the port's own hook. See mbm_node_idle.
+ *
+ * @param callback  the callback, which obeys the rules of mbm_port; NULL for none
+ * @return a status; see mbm_node_idle
+ */
+uint8_t mbm_node_preTransmission(mbm_node *node, void (*callback)(void));
+
+/**
+ * Sets the callback that is called after the last bit of a frame was sent, for example to switch
+ * an RS-485 driver off. It is called before the port's own hook. See mbm_node_idle.
+ *
+ * @param callback  the callback, which obeys the rules of mbm_port; NULL for none
+ * @return a status; see mbm_node_idle
+ */
+uint8_t mbm_node_postTransmission(mbm_node *node, void (*callback)(void));
+
+/**
  * Function 01: reads coils into the response words, 16 in each word. The first coil is the
  * lowest bit; the last word is padded with zeros (V1.1b3, 6.1).
  *
@@ -421,6 +485,17 @@ uint8_t mbm_node_readWriteQueuedRegisters(mbm_node *node, uint16_t readAddress,
                                           uint16_t readQuantity);
 
 /**
+ * Reads holding registers into the response words. mbm_node_receive then returns them one after
+ * the other.
+ *
+ * @param address   the first register, 0 to 65535, as on the wire
+ * @param quantity  the number of registers, 1 to 125
+ * @return the number of words that mbm_node_receive will return; 0 if the request failed, as
+ *         mbm_node_status says, if another request is pending, and in non-blocking mode
+ */
+uint8_t mbm_node_requestFrom(mbm_node *node, uint16_t address, uint16_t quantity);
+
+/**
  * Sets the unit to which the master sends later requests.
  *
  * @param unit  the unit identifier, 1 to 247; 0 is broadcast. The master also sends to 248 to
@@ -471,6 +546,30 @@ uint8_t mbm_node_setBlocking(mbm_node *node, uint8_t on);
 uint8_t mbm_node_setLenient(mbm_node *node, uint8_t on);
 
 /**
+ * Returns a response word: one that the last successful read stored, or an older one after it.
+ *
+ * @param index  0 to 255
+ * @return the word; 0xFFFF if `index` is past the last response word
+ */
+uint16_t mbm_node_getResponseBuffer(const mbm_node *node, uint8_t index);
+
+/** Sets every response word to 0. The position of mbm_node_receive does not change. */
+uint8_t mbm_node_clearResponseBuffer(mbm_node *node);
+
+/**
+ * Sets a transmit word, for the functions that write. The queue of mbm_node_send does not
+ * change.
+ *
+ * @param index  0 to the number of transmit words minus 1
+ * @param value  the word
+ * @return a status; MBM_ILLEGAL_DATA_ADDRESS if `index` is past the last transmit word
+ */
+uint8_t mbm_node_setTransmitBuffer(mbm_node *node, uint8_t index, uint16_t value);
+
+/** Sets every transmit word to 0. The queue of mbm_node_send keeps its length. */
+uint8_t mbm_node_clearTransmitBuffer(mbm_node *node);
+
+/**
  * Queues a word after the words queued before. If the last word holds queued bits, the new
  * word goes into the next one.
  *
@@ -478,6 +577,22 @@ uint8_t mbm_node_setLenient(mbm_node *node, uint8_t on);
  * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if the transmit buffer is full
  */
 uint8_t mbm_node_send(mbm_node *node, uint16_t word);
+
+/**
+ * Queues a byte as a word whose high byte is 0; see mbm_node_send.
+ *
+ * @param byte  0 to 255
+ * @return a status; see mbm_node_send
+ */
+uint8_t mbm_node_send8(mbm_node *node, uint8_t byte);
+
+/**
+ * Queues the two words of a number of 32 bits, the low word first; see mbm_node_send.
+ *
+ * @param value  the number, 0 to 4294967295
+ * @return a status; MBM_BUFFER_TOO_SMALL, with nothing queued, if two words do not fit
+ */
+uint8_t mbm_node_send32(mbm_node *node, uint32_t value);
 
 /**
  * Queues a bit after the bits queued before, starting at the lowest bit of a word.

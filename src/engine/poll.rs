@@ -22,6 +22,11 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         self.phase != Phase::Idle && self.phase < Phase::Send
     }
 
+    /// True if the request was sent, and waits for its reply or, as a broadcast, for the devices.
+    pub fn is_sent(&self) -> bool {
+        matches!(self.phase, Phase::Reply | Phase::Turnaround)
+    }
+
     /// True if the request was sent and its reply has not come.
     pub(crate) fn awaits_reply(&self) -> bool {
         self.phase == Phase::Reply

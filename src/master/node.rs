@@ -265,6 +265,15 @@ impl Node {
         fits
     }
 
+    /// Queues the two words of a number, the low one first: see [`Node::send`]. Returns false, and
+    /// queues nothing, if there are too few words for both.
+    pub fn send32(&mut self, words: &mut [u16], value: u32) -> bool {
+        let index = usize::from(self.transmit_bits.div_ceil(16));
+        words.len() >= index + 2
+            && self.send(words, value as u16)
+            && self.send(words, (value >> 16) as u16)
+    }
+
     /// Queues a bit in the transmit words. The first bit of a word is the least significant.
     /// Returns false, and queues nothing, if there are too few words.
     pub fn send_bit(&mut self, words: &mut [u16], on: bool) -> bool {

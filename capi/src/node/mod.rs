@@ -1,10 +1,12 @@
 //! `mbm_node_*`: a device on a line, for C.
 
+mod callbacks;
 pub(crate) mod object;
 mod requests;
 mod settings;
 mod words;
 
+pub use callbacks::*;
 pub use object::*;
 pub use requests::*;
 pub use settings::*;

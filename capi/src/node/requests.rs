@@ -1,6 +1,7 @@
 //! The ten functions, and their forms that use the queue of words to send.
 
-use super::{call, mbm_node, request};
+use super::{call, mbm_node, mbm_node_available, request};
+use mbm::error::Status;
 use mbm::pdu::functions::FunctionSpec;
 
 functions! {
@@ -139,4 +140,23 @@ functions! {
     /// @return a status; see mbm_node_readCoils
     fn mbm_node_readWriteQueuedRegisters(readAddress: u16, readQuantity: u16)
         = request(|node, line| node.read_write_queued_registers(line, (readAddress, readQuantity)));
+}
+
+/// Reads holding registers into the response words. mbm_node_receive then returns them one after
+/// the other.
+///
+/// @param address   the first register, 0 to 65535, as on the wire
+/// @param quantity  the number of registers, 1 to 125
+/// @return the number of words that mbm_node_receive will return; 0 if the request failed, as
+///         mbm_node_status says, if another request is pending, and in non-blocking mode
+#[no_mangle]
+pub unsafe extern "C" fn mbm_node_requestFrom(
+    node: *mut mbm_node,
+    address: u16,
+    quantity: u16,
+) -> u8 {
+    match mbm_node_readHoldingRegisters(node, address, quantity) {
+        status if status == Status::OK.code() => mbm_node_available(node),
+        _ => 0,
+    }
 }

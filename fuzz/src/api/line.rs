@@ -24,7 +24,12 @@ fn pick(w: &World) -> *mut mbm_line {
 }
 
 pub fn begin(w: &World, line: *mut mbm_line) {
-    let port = ports::port(w, MBM_FRAMING_RTU);
+    let mut port = ports::port(w, MBM_FRAMING_RTU);
+    if w.rarely(4) {
+        let callbacks: *mut mbm_nodeCallbacks = w.zeroed();
+        refused!(w, mbm_nodeCallbacks_begin(callbacks, port));
+        port = call!(w, mbm_nodeCallbacks_port(callbacks));
+    }
     let (frame, bytes) = match w.byte() {
         0..0xE0 => frame(w),
         0xE0..0xF8 => (null_mut(), 0),

@@ -47,15 +47,22 @@ fn begin(w: &World, node: *mut mbm_node) {
     }
 }
 
+/// A callback that makes no calls.
+unsafe extern "C" fn quiet() {}
+
 /// Settings. They may be set in hooks of the line, too.
 fn set(w: &World, node: *mut mbm_node) {
     let (byte, word, long) = (w.byte(), w.word(), w.long());
-    let choice = w.byte() % 4;
+    let choice = w.byte() % 8;
     let time = if byte < 0xF0 { word.into() } else { long };
+    let callback = (byte & 1 == 0).then_some(quiet as unsafe extern "C" fn());
     unchanged_if_refused(w, &[span(node)], "mbm_node_set", || match choice {
         0 => call!(w, mbm_node_setSlaveID(node, byte)),
         1 => call!(w, mbm_node_setResponseTimeout(node, time)),
         2 => call!(w, mbm_node_setBlocking(node, byte & 1)),
+        3 => call!(w, mbm_node_idle(node, callback)),
+        4 => call!(w, mbm_node_preTransmission(node, callback)),
+        5 => call!(w, mbm_node_postTransmission(node, callback)),
         _ => call!(w, mbm_node_setLenient(node, byte & 1)),
     });
     call!(w, mbm_node_getSlaveID(node));
@@ -166,7 +173,7 @@ fn poll(w: &World, node: *mut mbm_node) {
 
 fn words(w: &World, node: *mut mbm_node) {
     let (byte, word) = (w.byte(), w.word());
-    match w.byte() % 7 {
+    match w.byte() % 13 {
         0 => drop(call!(w, mbm_node_beginTransmission(node, word))),
         1 => {
             for _ in 0..byte % 130 {
@@ -187,6 +194,18 @@ fn words(w: &World, node: *mut mbm_node) {
             for _ in 0..byte % 8 {
                 call!(w, mbm_node_receive(node));
             }
+        }
+        6 => drop(call!(w, mbm_node_getResponseBuffer(node, byte))),
+        7..=11 => {
+            let (choice, long) = (w.byte() % 5, w.long());
+            let spans = [span(node)];
+            unchanged_if_refused(w, &spans, "a word", || match choice {
+                0 => call!(w, mbm_node_clearResponseBuffer(node)),
+                1 => call!(w, mbm_node_setTransmitBuffer(node, byte, word)),
+                2 => call!(w, mbm_node_clearTransmitBuffer(node)),
+                3 => call!(w, mbm_node_send8(node, byte)),
+                _ => call!(w, mbm_node_send32(node, long)),
+            });
         }
         _ => drop(call!(w, mbm_node_getExceptionCode(node))),
     }
