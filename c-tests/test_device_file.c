@@ -164,14 +164,19 @@ TEST(a_wrong_word_is_refused_with_its_line)
     static const struct {
         const char *text, *reason;
     } rows[] = {
-        {FIELD("    type: real\n"), "5: type: \"real\" is not one of bit, uint16, int16, uint32, "
-                                    "int32, uint64, int64, float, double, text, int24, "
-                                    "uint24, int48, uint48, sign_magnitude16, sign_magnitude32, "
-                                    "bcd16, bcd32, int32_m10k, uint32_m10k, int48_m10k, "
-                                    "uint48_m10k, int64_m10k, uint64_m10k, float16, text_spaces, "
-                                    "text_low, text_low_spaces, text_high, text_high_spaces, "
-                                    "unix32, unix64, unix64_ms, seconds_2000, iec870, iec870_3, "
-                                    "date and date_bcd"},
+        {FIELD("    type: real\n"),
+         "5: type: \"real\" is not one of the 38 words in docs/device-file.md: among them are bit, "
+         "uint16, int16, uint32, int32, uint64, int64, float, double and text"},
+        {FIELD("    type: FLOAT\n"), "5: type: \"FLOAT\" is not one of the 38 words in "
+                                     "docs/device-file.md: the nearest are float and float16"},
+        {FIELD("    type: bcd\n"), "5: type: \"bcd\" is not one of the 38 words in "
+                                   "docs/device-file.md: the nearest are bcd16 and bcd32"},
+        {FIELD("    type: uint8\n"),
+         "5: type: \"uint8\" is not one of the 38 words in "
+         "docs/device-file.md: the nearest are uint48, uint16, uint32 and uint64"},
+        {FIELD("    type: secondss_2000\n"),
+         "5: type: \"secondss_2000\" is not one of the 38 words in docs/device-file.md: the nearest "
+         "is seconds_2000"},
         {"fields:\n- name: a\n  table: holdings\n  address: 0\n  type: uint16\n",
          "3: table: \"holdings\" is not one of coils, discrete, holding and input"},
         {UINT16("    order: abcd\n"),

@@ -171,7 +171,7 @@ static const char *on_address(int about)
                      "use --one-based";
     case ADVICE_FILE:
         return "Check table, address and type in the file against the device's manual; if that "
-               "counts from 1, subtract 1";
+               "counts from 1, subtract 1, or write \"one_based: yes\" at the head of the file";
     case ADVICE_CALL:
         return "Check address and count in HEX against the device's manual; addresses in a request "
                "count from 0";

@@ -56,7 +56,7 @@ static bridge_line *find_line(bridge *b, const char *text, const char *topic)
 static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_line *next,
                    char wrong[YAML_FILE_WRONG_BYTES])
 {
-    const char *file = from->lines[index].path, *why;
+    const char *file = from->lines[index].path, *why, *lost;
     int code;
 
     next->table =
@@ -69,11 +69,13 @@ static int prepare(bridge *b, const bridge_setup *from, unsigned index, next_lin
         snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s", why);
         return CODE_WRONG;
     }
-    why = line_add_reach(&next->where, &next->table->fields.reach, options.in_flight);
+    why = line_add_reach(&next->where, &next->table->fields.reach, options.in_flight, &lost);
     if (why) {
         snprintf(wrong, YAML_FILE_WRONG_BYTES, "%s: %s", file, why);
         return CODE_WRONG;
     }
+    if (lost)
+        report_log(REPORT_WARNING, "%s: %s: %s", from->lines[index].text, file, lost);
     next->line = find_line(b, from->lines[index].text, from->lines[index].topic);
     next->is_new = !next->line;
     if (next->is_new)

@@ -314,11 +314,13 @@ void line_reach(line *l, const reach *what)
               l->place.has_gap ? l->place.gapMs * 1000 : 0);
 }
 
-const char *line_add_reach(place *where, const reach *of_device, uint32_t in_flight)
+const char *line_add_reach(place *where, const reach *of_device, uint32_t in_flight,
+                           const char **lost)
 {
     const reach_line has = place_reach(where, in_flight);
     reach own = *of_device;
 
+    *lost = reach_lost(&own, &has);
     reach_fit(&own, &has);
     reach_fill(&where->reach, &options.reach);
     reach_fill(&where->reach, &own);

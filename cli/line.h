@@ -62,8 +62,10 @@ void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_af
 void line_reach(line *l, const reach *what);
 
 /* Adds to what the name of a line says what the options say, and then what its device file says, as
- * far as the line can have it. Returns NULL, or what does not go together. */
-const char *line_add_reach(place *where, const reach *of_device, uint32_t in_flight);
+ * far as the line can have it: `lost` is NULL, or says what it cannot have. Returns NULL, or what
+ * does not go together. */
+const char *line_add_reach(place *where, const reach *of_device, uint32_t in_flight,
+                           const char **lost);
 
 /* Whether a request may be queued: the line is open, or it is being opened. A line that is not open
  * is opened for a request, but at most once a second. */

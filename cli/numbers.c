@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 const char *say(const char *format, ...)
 {
@@ -92,26 +93,116 @@ const char *number_time_text(uint32_t milliseconds, char text[32])
     return text;
 }
 
-const char *number_word(const char *text, const char *const *words, int *index)
+/* --- words --- */
+
+enum {
+    MANY_WORDS = 30, /* of more a sentence names the nearest */
+    NEAREST = 4,
+    FIRST = 10,
+    LONGEST_WORD = 40
+};
+
+static size_t least_of(size_t a, size_t b, size_t c)
 {
-    char list[1200] = "";
+    const size_t less = a < b ? a : b;
+
+    return less < c ? less : c;
+}
+
+/* How many letters must be written, left out or changed to make one word of the other. A capital is
+ * no other letter. */
+static size_t distance(const char *one, const char *other)
+{
+    size_t row[LONGEST_WORD + 1], i, j;
+    const size_t columns = strlen(other);
+
+    if (columns > LONGEST_WORD)
+        return SIZE_MAX;
+    for (j = 0; j <= columns; j++)
+        row[j] = j;
+    for (i = 1; one[i - 1]; i++) {
+        size_t diagonal = row[0];
+
+        row[0] = i;
+        for (j = 1; j <= columns; j++) {
+            const size_t above = row[j];
+            const int is_other =
+                tolower((unsigned char)one[i - 1]) != tolower((unsigned char)other[j - 1]);
+
+            row[j] = least_of(above + 1, row[j - 1] + 1, diagonal + (size_t)is_other);
+            diagonal = above;
+        }
+    }
+    return row[columns];
+}
+
+/* Appends words of a list with commas between them: those at the places in `chosen`, or the first.
+ */
+static void list_words(char *list, size_t capacity, const char *const *words, const int *chosen,
+                       int count)
+{
     size_t length = 0;
     int i;
 
+    for (i = 0; i < count && length < capacity; i++)
+        length += (size_t)snprintf(list + length, capacity - length, "%s%s",
+                                   i == 0          ? ""
+                                   : i + 1 < count ? ", "
+                                                   : " and ",
+                                   words[chosen ? chosen[i] : i]);
+}
+
+/* Finds the words that a wrong one may have been meant for, the nearest first. */
+static int find_near(const char *text, const char *const *words, int chosen[NEAREST])
+{
+    size_t at[NEAREST];
+    int i, j, count = 0;
+
     for (i = 0; words[i]; i++) {
-        if (strcmp(text, words[i]) == 0) {
-            *index = i;
+        const int is_beginning = strncasecmp(text, words[i], strlen(text)) == 0;
+        const size_t far = is_beginning ? 0 : distance(text, words[i]);
+
+        if (far > strlen(text) / 2)
+            continue;
+        for (j = count; j > 0 && far < at[j - 1]; j--)
+            if (j < NEAREST) {
+                at[j] = at[j - 1];
+                chosen[j] = chosen[j - 1];
+            }
+        if (j < NEAREST) {
+            at[j] = far;
+            chosen[j] = i;
+            count += count < NEAREST;
+        }
+    }
+    return count;
+}
+
+const char *number_word(const char *text, const char *const *words, int *index)
+{
+    char list[1200] = "";
+    int near[NEAREST], count, found;
+
+    for (count = 0; words[count]; count++)
+        if (strcmp(text, words[count]) == 0) {
+            *index = count;
             return NULL;
         }
-        if (length < sizeof list)
-            length += (size_t)snprintf(list + length, sizeof list - length, "%s%s",
-                                       i == 0         ? ""
-                                       : words[i + 1] ? ", "
-                                                      : " and ",
-                                       words[i]);
+    /* Completion asks for all words by an empty one. */
+    if (count <= MANY_WORDS || !*text) {
+        list_words(list, sizeof list, words, NULL, count);
+        return say("\"%.60s\" is not one of %s", text, list);
     }
-    return say("\"%.60s\" is not one of %s", text, list);
+    found = strlen(text) > LONGEST_WORD ? 0 : find_near(text, words, near);
+    list_words(list, sizeof list, words, found > 0 ? near : NULL, found > 0 ? found : FIRST);
+    return say("\"%.60s\" is not one of the %d words in docs/device-file.md: %s %s", text, count,
+               found == 0   ? "among them are"
+               : found == 1 ? "the nearest is"
+                            : "the nearest are",
+               list);
 }
+
+/* --- bytes --- */
 
 const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t *count)
 {

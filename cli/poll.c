@@ -20,7 +20,8 @@ typedef struct polling {
     place where;
     const char *file;
     uint32_t rounds, forMs;
-    int gap; /* DEVICE_PLAN_OWN_GAP: that of the file */
+    int value_width; /* columns of the table */
+    int gap;         /* DEVICE_PLAN_OWN_GAP: that of the file */
     uint8_t shows_plan;
 
     polled read;
@@ -34,6 +35,7 @@ typedef struct polling {
 
 /* --- the command line --- */
 
+enum { WIDEST_VALUE = 48 };
 enum { ROUNDS = 0x2000, FOR, ONCE, GAP, SHOW_PLAN, WATCH, HTTP };
 
 /* Refuses a table where there can be none. */
@@ -185,6 +187,23 @@ static void print_column(const char *text, int width)
     printf("  %s%*s", text, width > taken ? width - taken : 0, "");
 }
 
+/* Makes the column of values as wide as the widest so far. A text that is longer than most takes
+ * more columns in its own row. */
+static void widen(polling *p)
+{
+    static char value[POLLED_VALUE_BYTES];
+    uint16_t i;
+
+    for (i = 0; i < p->read.meter.readable; i++) {
+        int width;
+
+        (void)polled_value(&p->read, i, value);
+        width = screen_width(value);
+        if (width > p->value_width && width <= WIDEST_VALUE)
+            p->value_width = width;
+    }
+}
+
 static void print_row(polling *p, uint16_t field, int name_width)
 {
     static char value[POLLED_VALUE_BYTES];
@@ -197,7 +216,7 @@ static void print_row(polling *p, uint16_t field, int name_width)
     if (ageMs != UINT32_MAX)
         snprintf(age, sizeof age, "%ums", (unsigned)ageMs);
     print_column(p->read.meter.fields[field].name, name_width);
-    print_column(value, 16);
+    print_column(value, p->value_width);
     print_column(age, 7);
     printf("  %s\n", polled_status(&p->read, code, status));
 }
@@ -211,6 +230,7 @@ static void print_rows(polling *p, uint32_t round, const char *time)
         printf("\033[H\033[J");
     printf("round %u, %s: %u of %u fields read\n", (unsigned)round, time,
            polled_read_count(&p->read), p->read.meter.readable);
+    widen(p);
     for (i = 0; i < p->read.meter.readable; i++)
         print_row(p, i, name_width);
 }
@@ -240,6 +260,39 @@ static void show_round(polling *p, uint32_t round)
     report_flush();
 }
 
+/* Whether a unit has answered a request, if only with an exception. */
+static int answers_others(polling *p, uint16_t unit)
+{
+    uint16_t i;
+
+    for (i = 0; i < p->read.meter.readable; i++) {
+        const uint8_t status = mbm_plan_getStatus(&p->read.plan, i, NULL);
+
+        if (p->read.meter.planned[i].unit == unit &&
+            (status == MBM_OK || polled_exception(status) != 0))
+            return 1;
+    }
+    return 0;
+}
+
+static int is_bits(uint8_t table)
+{
+    return table <= MBM_TABLE_DISCRETE_INPUTS;
+}
+
+/* Finds the request of a field. Returns 0 if there is none. */
+static int find_read(const polling *p, const mbm_planField *planned, mbm_planReadInfo *read)
+{
+    uint16_t i;
+
+    for (i = 0; mbm_plan_getRead(&p->read.plan, i, read) == MBM_OK; i++)
+        if (read->unit == planned->unit && read->table == planned->table &&
+            read->intervalMs == planned->intervalMs && planned->address >= read->address &&
+            planned->address < (uint32_t)read->address + read->quantity)
+            return 1;
+    return 0;
+}
+
 /* Says how the first failure came about, and what to look at. An exception is about a field, other
  * failures are about its unit. */
 static void report_first_failure(polling *p)
@@ -249,6 +302,7 @@ static void report_first_failure(polling *p)
     const mbm_planField *planned = &p->read.meter.planned[p->first_failure.field];
     const device_field *field = &p->read.meter.fields[p->first_failure.field];
     const char *advice = advice_on(&p->read.at.place, ADVICE_FILE, status, exception, why);
+    mbm_planReadInfo read = {0};
     char who[200];
     uint16_t address;
     uint8_t table;
@@ -257,9 +311,20 @@ static void report_first_failure(polling *p)
     if (exception != 0)
         snprintf(who, sizeof who, "unit %u, field %.100s in line %d of the file", planned->unit,
                  field->name, field->line);
-    table = advice_manual(planned->table, planned->address, &address);
+    table = p->read.meter.notation == DEVICE_ON_WIRE
+                ? advice_manual(planned->table, planned->address, &address)
+                : 0;
+    if (status == MBM_RESPONSE_TIMED_OUT && !why && answers_others(p, planned->unit) &&
+        find_read(p, planned, &read) && read.quantity > 16)
+        advice = say("It answers other requests. Some devices do not answer a read of more %s than "
+                     "they can send, here %u: try %s in the file",
+                     is_bits(read.table) ? "bits" : "registers", read.quantity,
+                     is_bits(read.table) ? "max_read_bits" : "max_read_registers");
+    if (exception == MBM_ILLEGAL_DATA_ADDRESS && p->read.meter.notation != DEVICE_ON_WIRE)
+        advice = "Check table, address and type in the file against the device's manual";
     if (exception == MBM_ILLEGAL_DATA_ADDRESS && table != 0)
-        advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\"",
+        advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\", or "
+                     "\"notation: modicon\" if the whole file has such addresses",
                      planned->address, address, value_table_names[table], address);
     else if (exception == MBM_ILLEGAL_DATA_ADDRESS &&
              (p->read.setup.registerGap | p->read.setup.bitGap))
@@ -372,19 +437,21 @@ static void poll_rounds(polling *p)
 
 int poll_command(int argc, char **argv)
 {
-    static polling data = {.gap = DEVICE_PLAN_OWN_GAP};
+    static polling data = {.gap = DEVICE_PLAN_OWN_GAP, .value_width = 16};
     polling *p = &data;
     char wrong[YAML_FILE_WRONG_BYTES];
-    const char *why;
+    const char *why, *lost;
     int code;
 
     argp_parse(&arguments, argc, argv, 0, NULL, p);
     code = device_file_read(&p->read.meter, p->file, wrong);
     if (code != CODE_DONE)
         return report(code, "%s", wrong);
-    why = line_add_reach(&p->where, &p->read.meter.reach, options.in_flight);
+    why = line_add_reach(&p->where, &p->read.meter.reach, options.in_flight, &lost);
     if (why)
         return report(CODE_WRONG, "%s: %s", p->file, why);
+    if (lost && !options.is_quiet)
+        fprintf(stderr, "%s: %s: %s.\n", report_name, p->file, lost);
     why = device_plan_check(&p->read.meter, p->file, p->where.framing);
     if (why)
         return report(CODE_WRONG, "%s", why);

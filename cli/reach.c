@@ -225,6 +225,19 @@ static void forget(reach *of, int key)
     of->given = (uint16_t)(of->given & ~(1u << key));
 }
 
+const char *reach_lost(const reach *of, const reach_line *line)
+{
+    if (of->accept && line->framing != MBM_FRAMING_TCP)
+        return "accept has no effect here: it is for frames of Modbus TCP, in others nothing but "
+               "the unit tells whose a reply is";
+    if (of->is_lenient && line->framing == MBM_FRAMING_ASCII)
+        return "lenient has no effect in ASCII frames";
+    if ((of->delayMs > 0 || of->close) && !line->has_link)
+        return say("%s has no effect on udp://, which has no connection",
+                   of->delayMs > 0 ? "delay" : "close");
+    return NULL;
+}
+
 void reach_fit(reach *of, const reach_line *line)
 {
     if (line->framing != MBM_FRAMING_TCP)

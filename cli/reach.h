@@ -76,7 +76,9 @@ typedef struct reach_line {
  * `dash` is before the names: "--", or nothing. */
 const char *reach_check(const reach *of, const reach_line *line, const char *dash);
 
-/* Leaves out what a line cannot have; a device file says it for each line. */
+/* Returns NULL, or what a device file says that the line cannot have; and leaves that out: the same
+ * device may be on a line that can. */
+const char *reach_lost(const reach *of, const reach_line *line);
 void reach_fit(reach *of, const reach_line *line);
 
 /* Sets client and link; NULL for no link. `gapUs` is the gap of a serial line, 0: t3.5. */

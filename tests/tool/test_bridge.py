@@ -217,7 +217,7 @@ PLACE = "rtu:/dev/null"
     (f"{RIGHT}, unit: 300", 'unit: "300" is out of range: from 0 to 255'),
     (RIGHT.replace("holding", "register"), 'table: "register" is not one of coils, discrete, holding'),
     (RIGHT.replace(": 0", ": 65536"), 'address: "65536" is out of range: from 0 to 65535'),
-    (RIGHT.replace("uint16", "word"), 'type: "word" is not one of bit, uint16'),
+    (RIGHT.replace("uint16", "word"), 'type: "word" is not one of the 38 words in docs/device-file.md'),
     (RIGHT.replace("100ms", "0ms"), 'interval: "0ms" is out of range: from 1ms to 24h'),
     (RIGHT.replace("100ms", "100"), 'interval: "100" is not a time'),
     (f"{RIGHT}, scale: x", 'scale: "x" is neither a decimal number'),

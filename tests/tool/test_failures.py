@@ -210,8 +210,8 @@ FIELD = "fields:\n- {{name: level, table: holding, address: {}, type: uint16}}\n
     # poll and call have no --one-based.
     (2, ("poll", "LINE", "7", "--once", "-q"),
      "unit 1, field level in line 2 of the file: exception 02: illegal data address. Check table, address and type in the file", "--one-based"),
-    (2, ("poll", "LINE", "7", "--once", "-q", "--gap", 5), "subtract 1. Try without --gap.", "--one-based"),
-    (2, ("poll", "LINE", "30108", "--once", "-q"), 'In a manual, 30108 is address 107: write "table: input" and "address: 107".', "--one-based"),
+    (2, ("poll", "LINE", "7", "--once", "-q", "--gap", 5), "subtract 1, or write \"one_based: yes\" at the head of the file. Try without --gap.", "--one-based"),
+    (2, ("poll", "LINE", "30108", "--once", "-q"), 'In a manual, 30108 is address 107: write "table: input" and "address: 107", or "notation: modicon" if', "--one-based"),
     (2, ("call", "LINE", "03 9C A5 00 01"), "Check address and count in HEX against the device's manual; addresses in a request count from 0.",
      "--one-based"),
     (2, ("identify", "LINE"), "exception 02: illegal data address. The device does not have it.", "one-based|Check"),

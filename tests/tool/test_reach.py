@@ -134,6 +134,38 @@ def test_more_data_than_asked_are_taken_if_asked(mbm, write, generous):
     assert Client(listen).ask(9, bytes([3, 0, 5, 0, 1])) == number(5)
 
 
+def test_less_data_than_asked_is_refused_in_any_case(mbm, write):
+    line = TcpDevice(lambda pdu: number(7)).line
+    found = mbm("read", line, 7, 2, "--lenient", *QUICK)
+    assert found.code == DAMAGED and found.out == "" and "does not answer the request" in found.error, found
+    file = write("d.yaml", "lenient: yes\nfields: [{name: a, table: holding, address: 0, type: uint16, count: 2}]\n")
+    assert mbm("poll", line, file, "--once", *QUICK).code == DAMAGED
+    # The file describes what the device sends.
+    assert mbm("poll", line, write("d.yaml", FIELDS), "--once", *QUICK).code == DONE
+
+
+@pytest.mark.parametrize("line, key, sentence", [
+    ("rtu:", "accept: unit", "accept has no effect here: it is for frames of Modbus TCP, in others nothing but the unit tells whose a reply is."),
+    ("rtu:", "accept: [unit, transaction]", "accept has no effect here"),
+    ("ascii:/dev/null", "lenient: yes", "lenient has no effect in ASCII frames."),
+    ("udp://127.0.0.1:1", "delay: 1s", "delay has no effect on udp://, which has no connection."),
+    ("udp://127.0.0.1:1", "close: round", "close has no effect on udp://, which has no connection."),
+])
+def test_a_key_of_the_device_file_that_the_line_cannot_have_is_named(mbm, write, folder, line, key, sentence):
+    place = SerialDevice(folder).line if line == "rtu:" else line
+    file = write("d.yaml", f"{key}\n{FIELDS}")
+    found = mbm("poll", place, file, "--once", *QUICK)
+    assert f"mbm poll: {file}: {sentence}" in found.error, found.error
+    assert line != "rtu:" or found.code == DONE
+    assert "no effect" not in mbm("poll", place, file, "--once", "-q", *QUICK).error
+    assert f"{file}: {sentence.rstrip('.')}" in mbm("bridge", "--check", place, file).error
+
+
+def test_what_is_the_default_is_not_named(mbm, write, folder):
+    file = write("d.yaml", f"lenient: no\ndelay: 0s\nclose: never\n{FIELDS}")
+    assert "no effect" not in mbm("poll", "udp://127.0.0.1:1", file, "--once", *QUICK).error
+
+
 # --- pace: devices that answer nothing at first (telegraf 11919), that need a pause (HA 9451 and 50011, telegraf 9253), that are busy
 
 def test_nothing_is_sent_during_the_delay_after_connecting(mbm, write):

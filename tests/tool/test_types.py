@@ -260,3 +260,20 @@ def test_a_library_of_others_packs_the_same_halves(plain):
         line = TcpDevice(lambda pdu: bytes([pdu[0], 2]) + data).line
         text = plain("read", line, "-T", "float16", 0, *PATIENT).out.split()[1]
         assert struct.pack(">e", float(text)) == data, (text, value)
+
+
+def test_the_table_of_poll_has_columns_for_dates_and_texts(mbm, write):
+    file = write("clock.yaml", """\
+fields:
+  - {name: clock, table: holding, address: 0, type: unix32, value: "2026-11-27T20:15:30Z"}
+  - {name: serial, table: holding, address: 10, type: text, count: 30, value: "ABC-0123456789-0123456789"}
+  - {name: level, table: holding, address: 30, type: uint16, value: 5}
+  - {name: story, table: holding, address: 100, type: text, count: 80, value: "%s"}
+""" % ("long " * 15 + "end"))
+    found = mbm("poll", mbm.serve("tcp://127.0.0.1:0", file), file, "--once", "-q", *PATIENT)
+    rows = found.out.splitlines()[1:]
+    ages = [row.index("ms") for row in rows[:3]]
+    assert found.code == DONE and len({row.index("success") for row in rows[:3]}) == 1, found.out
+    assert max(ages) - min(ages) <= 2
+    # A text of 78 characters takes its columns in its own row alone.
+    assert rows[3].index("success") > rows[0].index("success") + 20 and "long end  " in rows[3]

@@ -39,7 +39,7 @@ write rtu+tcp://127.0.0.1:1 1 1 --unit 0|--unit 0 means all units
 call rtu+tcp://127.0.0.1:1 03 --unit 0|--unit 0 means all units
 identify rtu:/dev/null --unit 0|--unit 0 means all units
 read @LINE 1 --table coil|--table "coil" is not one of coils, discrete, holding and input
-read @LINE 1 --type flaot|--type "flaot" is not one of bit, uint16,
+read @LINE 1 --type flaot|--type "flaot" is not one of the 38 words in docs/device-file.md: the nearest is float.
 read @LINE 1 --order abcd|--order "abcd" is not one of ABCD, CDAB, BADC, DCBA, EFGHABCD,
 read @LINE 1 --table coils --type uint16|the table coils has no values of type uint16
 read @LINE 1 --type bit|the table holding has no values of type bit
@@ -162,7 +162,7 @@ serve tcp://:0 @FILE --fault refused-with=3|"refused-with": it goes with most-re
 serve tcp://:0 @FILE --fault deaf-after=1@2|deaf-after is there for the whole run, and has no @
 serve pty: @FILE --fault connections=1|"connections": this line cannot have it
 serve udp://:0 @FILE --fault one-request|"one-request": this line cannot have it
-serve pty: @BAD|@BAD:5: type: "real" is not one of bit, uint16,
+serve pty: @BAD|@BAD:5: type: "real" is not one of the 38 words in docs/device-file.md: among them are bit, uint16,
 serve tls://:0?ca=/a&cert=/b&key=/c --echo|serve: /b: No such file or directory
 poll|LINE is missing
 poll @LINE|FILE is missing
@@ -180,7 +180,7 @@ poll @LINE @FILE --http 127.0.0.1|is not a port, or an address in numbers
 poll @LINE @FILE --http ::1:80|is not a port, or an address in numbers
 poll @LINE @FILE --http [::1]|is not a port, or an address in numbers
 poll @LINE @FILE --http :80|is not a port, or an address in numbers
-poll @LINE @BAD|@BAD:5: type: "real" is not one of bit, uint16,
+poll @LINE @BAD|@BAD:5: type: "real" is not one of the 38 words in docs/device-file.md: among them are bit, uint16,
 poll @LINE @WRITTEN|@WRITTEN has no field that can be read
 1 serve pty: /nowhere.yaml|/nowhere.yaml: No such file or directory
 1 poll @LINE /nowhere.yaml|/nowhere.yaml: No such file or directory
