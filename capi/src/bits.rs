@@ -1,7 +1,7 @@
 //! `mbm_bits_*`: coils and discrete inputs, packed in bytes as on the wire, or in words as
 //! in the master's word buffers.
 
-use super::pointers::{put_result, slice, slice_mut};
+use super::pointers::{In, Out};
 use mbm::data::bits::{self, Packed};
 use mbm::error::{Error, Status};
 
@@ -14,28 +14,16 @@ fn units<T: Packed>(quantity: u16) -> usize {
     usize::from(quantity).div_ceil(T::BITS)
 }
 
-/// # Safety
-/// As [`slice`] demands of `units`, which hold `quantity` bits; `on` is NULL or
-/// points to a byte.
-unsafe fn read_bit<T: Packed>(
-    units: *const T,
-    first: u16,
-    quantity: u16,
-    address: u16,
-    on: *mut u8,
-) -> u8 {
-    code(slice(units, self::units::<T>(quantity)).and_then(|units| {
-        put_result(on, || {
-            bits::is_set(units, first, quantity, address).map(u8::from)
-        })
+fn read_bit<T: Packed>(units: In<T>, first: u16, quantity: u16, address: u16, on: Out<u8>) -> u8 {
+    code(units.slice(self::units::<T>(quantity)).and_then(|units| {
+        on.put_result(|| bits::is_set(units, first, quantity, address).map(u8::from))
     }))
 }
 
-/// # Safety
-/// As [`slice_mut`] demands of `units`, which hold `quantity` bits.
-unsafe fn set<T: Packed>(units: *mut T, first: u16, quantity: u16, address: u16, on: u8) -> u8 {
+fn set<T: Packed>(units: Out<T>, first: u16, quantity: u16, address: u16, on: u8) -> u8 {
     code(
-        slice_mut(units, self::units::<T>(quantity))
+        units
+            .slice(self::units::<T>(quantity))
             .and_then(|units| bits::set(units, first, quantity, address, on != 0)),
     )
 }
@@ -50,15 +38,10 @@ unsafe fn set<T: Packed>(units: *mut T, first: u16, quantity: u16, address: u16,
 /// @param length    the number of bytes that `bytes` can hold
 /// @return a status; MBM_BUFFER_TOO_SMALL, with nothing packed
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_pack(
-    coils: *const u8,
-    quantity: u16,
-    bytes: *mut u8,
-    length: u16,
-) -> u8 {
-    code(slice(coils, quantity.into()).and_then(|coils| {
+pub extern "C" fn mbm_bits_pack(coils: In<u8>, quantity: u16, bytes: Out<u8>, length: u16) -> u8 {
+    code(coils.slice(quantity.into()).and_then(|coils| {
         let on = coils.iter().map(|coil| *coil != 0);
-        bits::pack(slice_mut(bytes, length.into())?, on)
+        bits::pack(bytes.slice(length.into())?, on)
     }))
 }
 
@@ -70,14 +53,9 @@ pub unsafe extern "C" fn mbm_bits_pack(
 /// @param quantity  the number of coils, 0 to 65535
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if `bytes` has fewer bits than `quantity`
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_unpack(
-    bytes: *const u8,
-    length: u16,
-    coils: *mut u8,
-    quantity: u16,
-) -> u8 {
-    code(slice(bytes, length.into()).and_then(|bytes| {
-        let coils = slice_mut(coils, quantity.into())?;
+pub extern "C" fn mbm_bits_unpack(bytes: In<u8>, length: u16, coils: Out<u8>, quantity: u16) -> u8 {
+    code(bytes.slice(length.into()).and_then(|bytes| {
+        let coils = coils.slice(quantity.into())?;
         for (coil, on) in coils.iter_mut().zip(bits::unpack(bytes, quantity.into())?) {
             *coil = on.into();
         }
@@ -95,12 +73,12 @@ pub unsafe extern "C" fn mbm_bits_unpack(
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
 ///         passes address 65535
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_isSet(
-    bytes: *const u8,
+pub extern "C" fn mbm_bits_isSet(
+    bytes: In<u8>,
     first: u16,
     quantity: u16,
     address: u16,
-    on: *mut u8,
+    on: Out<u8>,
 ) -> u8 {
     read_bit(bytes, first, quantity, address, on)
 }
@@ -115,8 +93,8 @@ pub unsafe extern "C" fn mbm_bits_isSet(
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
 ///         passes address 65535
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_set(
-    bytes: *mut u8,
+pub extern "C" fn mbm_bits_set(
+    bytes: Out<u8>,
     first: u16,
     quantity: u16,
     address: u16,
@@ -131,12 +109,12 @@ pub unsafe extern "C" fn mbm_bits_set(
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
 ///         passes address 65535
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_isSetInWords(
-    words: *const u16,
+pub extern "C" fn mbm_bits_isSetInWords(
+    words: In<u16>,
     first: u16,
     quantity: u16,
     address: u16,
-    on: *mut u8,
+    on: Out<u8>,
 ) -> u8 {
     read_bit(words, first, quantity, address, on)
 }
@@ -147,8 +125,8 @@ pub unsafe extern "C" fn mbm_bits_isSetInWords(
 /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
 ///         passes address 65535
 #[no_mangle]
-pub unsafe extern "C" fn mbm_bits_setInWords(
-    words: *mut u16,
+pub extern "C" fn mbm_bits_setInWords(
+    words: Out<u16>,
     first: u16,
     quantity: u16,
     address: u16,

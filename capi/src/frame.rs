@@ -1,10 +1,9 @@
 //! Building, parsing and measuring of whole frames, and the exception for a refused request.
 
 use super::framing::mbm_framing;
-use super::packet::{
-    mbm_length, mbm_packet, own, put_expected, reply_length, side, MBM_PACKET_REQUEST,
-};
-use super::pointers::{buffer, get, put, put_length, required, slice};
+use super::functions::declared;
+use super::packet::{mbm_length, mbm_packet, put_expected, reply_length, side, MBM_PACKET_REQUEST};
+use super::pointers::{In, Out};
 use mbm::error::{Error, Status};
 use mbm::frame::checksum::{crc16, lrc, Crc16};
 use mbm::frame::{Adu, Framing};
@@ -31,23 +30,16 @@ fn function(framing: Option<Framing>, bytes: &[u8]) -> Option<u8> {
 }
 
 /// Converts an `mbm_framing`. `code` returns the function code whose declaration is needed.
-///
-/// # Safety
-/// `framing` is NULL or points to one that is valid.
-unsafe fn format(
-    framing: *const mbm_framing,
+fn format(
+    framing: In<mbm_framing>,
     code: impl FnOnce(Option<Framing>) -> Option<u8>,
 ) -> Result<FrameFormat, Error> {
-    let description = get(framing)?;
+    let description = framing.get()?;
     let framing = description.core()?;
     Ok(FrameFormat {
         framing,
         end: description.end(),
-        own: own(
-            description.functions,
-            description.functionCount,
-            code(framing),
-        )?,
+        own: declared(description.functions()?, code(framing))?,
     })
 }
 
@@ -64,22 +56,22 @@ unsafe fn format(
 /// @return a status; MBM_BUFFER_TOO_SMALL; otherwise the status that mbm_frame_parse would return
 ///         for such a frame
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_build(
-    framing: *const mbm_framing,
-    packet: *const mbm_packet,
-    frame: *mut u8,
+pub extern "C" fn mbm_frame_build(
+    framing: In<mbm_framing>,
+    packet: In<mbm_packet>,
+    frame: Out<u8>,
     capacity: u16,
-    length: *mut u16,
+    length: Out<u16>,
 ) -> u8 {
     // Data and buffer do not overlap.
     let build = || {
-        let mut packet = get(packet)?;
-        if packet.lies_in(frame, capacity) {
+        let mut packet = packet.get()?;
+        if packet.lies_in(frame.pointer(), capacity) {
             return Err(Error::InvalidArgument);
         }
         let format = format(framing, |_| Some(packet.function))?;
-        required(length)?;
-        let buffer = buffer(frame, capacity)?;
+        length.required()?;
+        let buffer = frame.buffer(capacity)?;
         let data = packet.data()?;
         let Head {
             transaction, unit, ..
@@ -92,7 +84,7 @@ pub unsafe extern "C" fn mbm_frame_build(
             None => packet.emit(data, own, buffer),
         }
     };
-    put_length(length, build())
+    length.put_length(build())
 }
 
 /// Parses a frame into a packet. The packet's data point into the frame.
@@ -116,16 +108,16 @@ pub unsafe extern "C" fn mbm_frame_build(
 ///         MBM_INVALID_FUNCTION for a function code that the standard does not define and `framing`
 ///         does not declare
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_parse(
-    framing: *const mbm_framing,
+pub extern "C" fn mbm_frame_parse(
+    framing: In<mbm_framing>,
     kind: u8,
-    frame: *mut u8,
+    frame: Out<u8>,
     frameLength: u16,
-    packet: *mut mbm_packet,
+    packet: Out<mbm_packet>,
 ) -> u8 {
     let arguments = side(kind).and_then(|pdu_kind| {
-        required(packet)?;
-        let bytes = buffer(frame, frameLength)?;
+        packet.required()?;
+        let bytes = frame.buffer(frameLength)?;
         let format = format(framing, |framing| function(framing, bytes))?;
         Ok((pdu_kind, bytes, format))
     });
@@ -152,7 +144,7 @@ pub unsafe extern "C" fn mbm_frame_parse(
         }
         Err(refused) => refused.status(),
     };
-    put(packet, found);
+    packet.put(found);
     status.code()
 }
 
@@ -171,28 +163,28 @@ pub unsafe extern "C" fn mbm_frame_parse(
 ///         answers; MBM_ILLEGAL_FUNCTION for a function code from 0x80 on, which no exception can
 ///         contain; MBM_BUFFER_TOO_SMALL; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_exception(
-    framing: *const mbm_framing,
-    request: *const mbm_packet,
+pub extern "C" fn mbm_frame_exception(
+    framing: In<mbm_framing>,
+    request: In<mbm_packet>,
     code: u8,
-    frame: *mut u8,
+    frame: Out<u8>,
     capacity: u16,
-    length: *mut u16,
+    length: Out<u16>,
 ) -> u8 {
     let build = || {
-        let request = get(request)?;
+        let request = request.get()?;
         if request.kind != MBM_PACKET_REQUEST {
             return Err(Error::InvalidArgument);
         }
         let format = format(framing, |_| None)?;
-        required(length)?;
-        let buffer = buffer(frame, capacity)?;
+        length.required()?;
+        let buffer = frame.buffer(capacity)?;
         let code = Status::from_code(code);
         let framing = format.framing.ok_or(Error::InvalidArgument)?;
         let exception = Exception::new(framing, request.head()?, code)?;
         exception.emit(framing, format.end, buffer)
     };
-    put_length(length, build())
+    length.put_length(build())
 }
 
 /// Computes the length of a frame from its first bytes.
@@ -213,16 +205,16 @@ pub unsafe extern "C" fn mbm_frame_exception(
 /// @return a status; MBM_MALFORMED_FRAME if no frame starts with these bytes, or if no frame may be
 ///         as long as they say
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_expectedLength(
-    framing: *const mbm_framing,
+pub extern "C" fn mbm_frame_expectedLength(
+    framing: In<mbm_framing>,
     kind: u8,
-    bytes: *const u8,
+    bytes: In<u8>,
     have: u16,
-    expected: *mut mbm_length,
+    expected: Out<mbm_length>,
 ) -> u8 {
     let measure = || {
         let pdu_kind = side(kind)?;
-        let bytes = slice(bytes, have.into())?;
+        let bytes = bytes.slice(have.into())?;
         let format = format(framing, |framing| function(framing, bytes))?;
         let own = format.own.as_slice();
         match format.framing {
@@ -256,13 +248,13 @@ fn pdu_length(pdu_kind: PduKind, bytes: &[u8], own: &[Function]) -> Result<Lengt
 /// @return a status; MBM_INVALID_ARGUMENT if the packet is not a request; otherwise the status for
 ///         which mbm_frame_build refuses the request
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_replyLength(
-    framing: *const mbm_framing,
-    request: *const mbm_packet,
-    expected: *mut mbm_length,
+pub extern "C" fn mbm_frame_replyLength(
+    framing: In<mbm_framing>,
+    request: In<mbm_packet>,
+    expected: Out<mbm_length>,
 ) -> u8 {
     let measure = || {
-        let mut packet = get(request)?;
+        let mut packet = request.get()?;
         let format = format(framing, |_| Some(packet.function))?;
         let own = format.own.as_slice();
         let unit = packet.head()?.unit;
@@ -289,18 +281,18 @@ pub unsafe extern "C" fn mbm_frame_replyLength(
 /// @return a status; MBM_INCOMPLETE_FRAME if more bytes are needed to decide;
 ///         MBM_MALFORMED_FRAME if the bytes are not a Modbus TCP frame
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
-    bytes: *const u8,
+pub extern "C" fn mbm_frame_looksLikeTcp(
+    bytes: In<u8>,
     have: u16,
     allowUnknown: u8,
-    expected: *mut u16,
+    expected: Out<u16>,
 ) -> u8 {
     let measure = || {
-        required(expected)?;
-        let bytes = slice(bytes, have.into())?;
+        expected.required()?;
+        let bytes = bytes.slice(have.into())?;
         length::looks_like_tcp(bytes, allowUnknown != 0, &[])
     };
-    put_length(expected, measure())
+    expected.put_length(measure())
 }
 
 /// Computes the CRC-16 of an RTU frame (serial line guide V1.02, 6.2.2). A frame carries
@@ -312,8 +304,8 @@ pub unsafe extern "C" fn mbm_frame_looksLikeTcp(
 /// @param length  the number of bytes
 /// @return the CRC; 0xFFFF if `bytes` is NULL or `length` is 0
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
-    let crc = slice(bytes, length.into()).map_or(Crc16::START, crc16);
+pub extern "C" fn mbm_frame_crc16(bytes: In<u8>, length: u16) -> u16 {
+    let crc = bytes.slice(length.into()).map_or(Crc16::START, crc16);
     u16::from_le_bytes(crc.to_bytes())
 }
 
@@ -325,6 +317,6 @@ pub unsafe extern "C" fn mbm_frame_crc16(bytes: *const u8, length: u16) -> u16 {
 /// @param length  the number of bytes
 /// @return the LRC; 0 if `bytes` is NULL or `length` is 0
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_lrc(bytes: *const u8, length: u16) -> u8 {
-    slice(bytes, length.into()).map_or(0, lrc)
+pub extern "C" fn mbm_frame_lrc(bytes: In<u8>, length: u16) -> u8 {
+    bytes.slice(length.into()).map_or(0, lrc)
 }

@@ -1,6 +1,7 @@
 //! The framings, as C programs name them.
 
 use super::functions::mbm_function;
+use super::pointers::In;
 use mbm::error::Error;
 use mbm::frame::{ascii, tcp, Framing};
 
@@ -57,6 +58,12 @@ impl mbm_framing {
     /// As [`Self::core`], but MBM_FRAMING_NONE is an error.
     pub(super) fn of_frames(&self) -> Result<Framing, Error> {
         self.core()?.ok_or(Error::InvalidArgument)
+    }
+
+    /// The declarations.
+    pub(super) fn functions<'a>(&self) -> Result<&'a [mbm_function], Error> {
+        // SAFETY: C filled in the description as its comment says.
+        unsafe { In::new(self.functions) }.slice(self.functionCount.into())
     }
 
     /// The last character of an ASCII frame.

@@ -82,6 +82,7 @@ pub use link::*;
 pub use node::*;
 pub use packet::*;
 pub use plan::*;
+pub use pointers::{In, Out};
 pub use port::*;
 pub use registers::*;
 pub use ring::*;

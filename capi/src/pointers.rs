@@ -4,47 +4,210 @@
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::{Error, Status};
 
+/// A pointer of C to values that this library reads: NULL, or to as many as the comment of the C
+/// function says, which nothing writes while that function reads them.
+#[repr(transparent)]
+pub struct In<T>(*const T);
+
+impl<T> Clone for In<T> {
+    fn clone(&self) -> In<T> {
+        *self
+    }
+}
+
+impl<T> Copy for In<T> {}
+
+impl<T> From<&T> for In<T> {
+    fn from(value: &T) -> In<T> {
+        In(value)
+    }
+}
+
+impl<T> In<T> {
+    /// The pointer, as C passes it.
+    ///
+    /// # Safety
+    /// It is as [`In`] says.
+    pub const unsafe fn new(pointer: *const T) -> In<T> {
+        In(pointer)
+    }
+
+    /// The same values, as a type that has their bytes.
+    pub(crate) fn cast<U>(self) -> In<U> {
+        In(self.0.cast())
+    }
+
+    /// The pointer as C passed it.
+    pub(crate) fn pointer(self) -> *const T {
+        self.0
+    }
+
+    /// The value; `None` if the pointer is NULL.
+    pub(crate) fn value<'a>(self) -> Option<&'a T> {
+        // SAFETY: NULL or a value, as `In` says.
+        unsafe { self.0.as_ref() }
+    }
+
+    /// Refuses NULL.
+    pub(crate) fn required(self) -> Result<(), Error> {
+        required(self.0)
+    }
+
+    /// The array of `count` values. The pointer may be NULL only if `count` is 0. Refused if the
+    /// array would be longer than any memory.
+    pub(crate) fn slice<'a>(self, count: usize) -> Result<&'a [T], Error> {
+        match count {
+            0 => Ok(&[]),
+            // SAFETY: an array of C, as `In` says.
+            _ if is_array(self.0, count) => Ok(unsafe { from_raw_parts(self.0, count) }),
+            _ => Err(Error::InvalidArgument),
+        }
+    }
+
+    /// The array of `count` values; an empty one if the pointer is NULL.
+    pub(crate) fn slice_or_empty<'a>(self, count: usize) -> &'a [T] {
+        match self.0.is_null() {
+            true => &[],
+            // SAFETY: an array of C, as `In` says.
+            false => unsafe { from_raw_parts(self.0, count) },
+        }
+    }
+}
+
+impl<T: Copy> In<T> {
+    /// A copy of the value. Refused if the pointer is NULL.
+    pub(crate) fn get(self) -> Result<T, Error> {
+        required(self.0)?;
+        // SAFETY: not NULL, so a value.
+        Ok(unsafe { self.0.read() })
+    }
+}
+
+impl In<u8> {
+    /// The characters of a C string, without the NUL that ends it: at most `most + 1`, and it
+    /// reads no more.
+    pub(crate) fn text<'a>(self, most: usize) -> Result<&'a [u8], Error> {
+        required(self.0)?;
+        let mut count = 0;
+        // SAFETY: no byte after the NUL is read.
+        while count <= most && unsafe { *self.0.add(count) } != 0 {
+            count += 1;
+        }
+        self.slice(count)
+    }
+}
+
+/// A pointer of C to values that this library writes: NULL, or to storage for as many as the
+/// comment of the C function says, which nothing else uses meanwhile.
+#[repr(transparent)]
+pub struct Out<T>(*mut T);
+
+impl<T> From<&mut T> for Out<T> {
+    fn from(value: &mut T) -> Out<T> {
+        Out(value)
+    }
+}
+
+impl<T> Out<T> {
+    /// The pointer, as C passes it.
+    ///
+    /// # Safety
+    /// It is as [`Out`] says.
+    pub const unsafe fn new(pointer: *mut T) -> Out<T> {
+        Out(pointer)
+    }
+
+    /// As [`In::cast`].
+    pub(crate) fn cast<U>(self) -> Out<U> {
+        Out(self.0.cast())
+    }
+
+    /// The pointer as C passed it.
+    pub(crate) fn pointer(&self) -> *mut T {
+        self.0
+    }
+
+    /// True if it is NULL.
+    pub(crate) fn is_null(&self) -> bool {
+        self.0.is_null()
+    }
+
+    /// Refuses NULL.
+    pub(crate) fn required(&self) -> Result<(), Error> {
+        required(self.0)
+    }
+
+    /// As [`In::value`], writable.
+    pub(crate) fn value<'a>(self) -> Option<&'a mut T> {
+        // SAFETY: NULL or a value, as `Out` says.
+        unsafe { self.0.as_mut() }
+    }
+
+    /// As [`In::slice`], writable.
+    pub(crate) fn slice<'a>(self, count: usize) -> Result<&'a mut [T], Error> {
+        match count {
+            0 => Ok(&mut []),
+            // SAFETY: an array of C, as `Out` says.
+            _ if is_array(self.0, count) => Ok(unsafe { from_raw_parts_mut(self.0, count) }),
+            _ => Err(Error::InvalidArgument),
+        }
+    }
+
+    /// As [`Out::slice`], but never NULL.
+    pub(crate) fn buffer<'a>(self, capacity: u16) -> Result<&'a mut [T], Error> {
+        match is_array(self.0, capacity.into()) {
+            // SAFETY: an array of C, as `Out` says.
+            true => Ok(unsafe { from_raw_parts_mut(self.0, capacity.into()) }),
+            false => Err(Error::InvalidArgument),
+        }
+    }
+
+    /// Writes a value. Returns the code of [`Status::OK`], or of [`Status::INVALID_ARGUMENT`] if
+    /// the pointer is NULL.
+    pub(crate) fn put(&self, value: T) -> u8 {
+        if self.0.is_null() {
+            return Status::INVALID_ARGUMENT.code();
+        }
+        // SAFETY: not NULL, so storage of a value.
+        unsafe { self.0.write(value) }
+        Status::OK.code()
+    }
+
+    /// Writes the result of `find`; nothing if `find` returns an error.
+    pub(crate) fn put_result(&self, find: impl FnOnce() -> Result<T, Error>) -> Result<(), Error> {
+        required(self.0)?;
+        // SAFETY: not NULL, so storage of a value.
+        unsafe { self.0.write(find()?) }
+        Ok(())
+    }
+}
+
+impl<T: Copy> Out<T> {
+    /// As [`In::get`], of a value that is then written.
+    pub(crate) fn get(&self) -> Result<T, Error> {
+        In(self.0.cast_const()).get()
+    }
+}
+
+impl Out<u16> {
+    /// As [`Out::put`], for a length. For an error it writes the length 0 and returns the code of
+    /// the error.
+    pub(crate) fn put_length(&self, length: Result<usize, Error>) -> u8 {
+        match length {
+            Ok(length) => self.put(length as u16),
+            Err(refused) => {
+                self.put(0);
+                refused.code()
+            }
+        }
+    }
+}
+
 /// Refuses a pointer that is NULL.
-pub(crate) fn required<T>(pointer: *const T) -> Result<(), Error> {
+fn required<T>(pointer: *const T) -> Result<(), Error> {
     match pointer.is_null() {
         true => Err(Error::InvalidArgument),
         false => Ok(()),
-    }
-}
-
-/// The array of `count` items at `items`, which may be NULL only if `count` is 0. Refused if it would
-/// be longer than any memory.
-///
-/// # Safety
-/// `items` is NULL or points to `count` items, which nothing writes while the slice lives.
-pub(crate) unsafe fn slice<'a, T>(items: *const T, count: usize) -> Result<&'a [T], Error> {
-    match count {
-        0 => Ok(&[]),
-        _ if is_array(items, count) => Ok(from_raw_parts(items, count)),
-        _ => Err(Error::InvalidArgument),
-    }
-}
-
-/// The array of `count` items at `items`; an empty one if that is NULL.
-///
-/// # Safety
-/// As for [`slice`].
-pub(crate) unsafe fn slice_or_empty<'a, T>(items: *const T, count: usize) -> &'a [T] {
-    match items.is_null() {
-        true => &[],
-        false => from_raw_parts(items, count),
-    }
-}
-
-/// As [`slice`], writable.
-///
-/// # Safety
-/// As for [`slice`]; nothing else reads the items either: see [`overlap`].
-pub(crate) unsafe fn slice_mut<'a, T>(items: *mut T, count: usize) -> Result<&'a mut [T], Error> {
-    match count {
-        0 => Ok(&mut []),
-        _ if is_array(items, count) => Ok(from_raw_parts_mut(items, count)),
-        _ => Err(Error::InvalidArgument),
     }
 }
 
@@ -54,57 +217,10 @@ fn is_array<T>(items: *const T, count: usize) -> bool {
     is_short && !items.is_null()
 }
 
-/// As [`slice_mut`], for a buffer that must not be NULL.
-///
-/// # Safety
-/// As for [`slice_mut`].
-pub(crate) unsafe fn buffer<'a>(bytes: *mut u8, capacity: u16) -> Result<&'a mut [u8], Error> {
-    match is_array(bytes, capacity.into()) {
-        true => Ok(from_raw_parts_mut(bytes, capacity.into())),
-        false => Err(Error::InvalidArgument),
-    }
-}
-
 /// True if the `bytes` bytes at `one` and the `more` bytes at `other` have a byte in common.
 pub(crate) fn overlap(one: *const u8, bytes: u16, other: *const u8, more: u16) -> bool {
     let (one, other) = (one as usize, other as usize);
     one < other.saturating_add(usize::from(more)) && other < one.saturating_add(usize::from(bytes))
-}
-
-/// A copy of the value at `place`. Refused if `place` is NULL.
-///
-/// # Safety
-/// `place` is NULL or points to a value.
-pub(crate) unsafe fn get<T: Copy>(place: *const T) -> Result<T, Error> {
-    required(place)?;
-    Ok(place.read())
-}
-
-/// Writes a value to `place`. Returns the code of [`Status::OK`], or of
-/// [`Status::INVALID_ARGUMENT`] if `place` is NULL.
-///
-/// # Safety
-/// `place` is NULL or points to storage of a value.
-pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> u8 {
-    if place.is_null() {
-        return Status::INVALID_ARGUMENT.code();
-    }
-    place.write(value);
-    Status::OK.code()
-}
-
-/// As [`put`], for a length. For an error it writes the length 0 and returns the code of the error.
-///
-/// # Safety
-/// As for [`put`].
-pub(crate) unsafe fn put_length(place: *mut u16, length: Result<usize, Error>) -> u8 {
-    match length {
-        Ok(length) => put(place, length as u16),
-        Err(refused) => {
-            put(place, 0);
-            refused.code()
-        }
-    }
 }
 
 /// A type of object that C programs use. The C program owns the storage and zeroes it before
@@ -317,33 +433,4 @@ pub(crate) unsafe fn read<'a, O: CObject, T>(
         Status::OK => getter(O::access(object.cast_mut())),
         _ => otherwise,
     }
-}
-
-/// Writes the result of `find` to `place`; nothing if `find` returns an error.
-///
-/// # Safety
-/// `place` is NULL or points to a `T`.
-pub(crate) unsafe fn put_result<T>(
-    place: *mut T,
-    find: impl FnOnce() -> Result<T, Error>,
-) -> Result<(), Error> {
-    required(place)?;
-    place.write(find()?);
-    Ok(())
-}
-
-/// The characters of a C string, without the NUL that ends it.
-///
-/// It reads and returns at most `most + 1` characters.
-///
-/// # Safety
-/// `text` is NULL or points to characters that a NUL ends.
-pub(crate) unsafe fn text<'a>(text: *const u8, most: usize) -> Result<&'a [u8], Error> {
-    required(text)?;
-    let mut count = 0;
-    // No byte after the NUL is read.
-    while count <= most && *text.add(count) != 0 {
-        count += 1;
-    }
-    slice(text, count)
 }

@@ -2,19 +2,16 @@
 
 use super::framing::mbm_framing;
 use super::packet::side;
-use super::pointers::{buffer, get, slice};
+use super::pointers::{In, Out};
 use core::ffi::c_char;
 use mbm::error::{Error, Status};
 use mbm::text::{self, TextWriter};
 
 /// The writer of a line of text into a buffer of C. It is an error if `size` is 0: the
 /// zero byte that ends the line must fit.
-///
-/// # Safety
-/// `text` is NULL or points to `size` bytes, which nothing else uses meanwhile.
-pub(super) unsafe fn line<'a>(text: *mut c_char, size: u16) -> Result<TextWriter<'a>, Error> {
+pub(super) fn line<'a>(text: Out<c_char>, size: u16) -> Result<TextWriter<'a>, Error> {
     // A character is a byte.
-    let text = buffer(text.cast(), size)?;
+    let text = text.cast().buffer(size)?;
     match text.first_mut() {
         Some(first) => *first = 0,
         None => return Err(Error::BufferTooSmall),
@@ -44,19 +41,19 @@ pub(super) fn outcome(written: Result<TextWriter, Error>) -> u8 {
 /// @return a status; MBM_BUFFER_TOO_SMALL if `text` received only the start of the line;
 ///         MBM_INVALID_ARGUMENT for MBM_FRAMING_NONE
 #[no_mangle]
-pub unsafe extern "C" fn mbm_frame_text(
-    framing: *const mbm_framing,
+pub extern "C" fn mbm_frame_text(
+    framing: In<mbm_framing>,
     kind: u8,
-    frame: *const u8,
+    frame: In<u8>,
     frameLength: u16,
-    text: *mut c_char,
+    text: Out<c_char>,
     size: u16,
 ) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let description = get(framing)?;
+        let description = framing.get()?;
         let (framing, end) = (description.of_frames()?, description.end());
-        let frame = slice(frame, frameLength.into())?;
+        let frame = frame.slice(frameLength.into())?;
         text::frame(&mut line, framing, side(kind)?, frame, end);
         Ok(line)
     };

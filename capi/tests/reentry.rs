@@ -162,8 +162,8 @@ fn hooks_use_the_trace_that_called_them() {
         let status = mbm_trace_begin(
             trace,
             MBM_PACKET_REQUEST,
-            &port,
-            framing,
+            In::from(&port),
+            In::new(framing),
             place,
             64,
             hook,
@@ -265,7 +265,7 @@ fn hooks_and_idle_use_the_line_and_the_node_that_called_them() {
 /// A reply of the unit 17: the registers 1 and 2.
 fn reply() -> Vec<u8> {
     let data = [17, 3, 4, 0, 1, 0, 2];
-    let crc = unsafe { mbm_frame_crc16(data.as_ptr(), data.len() as u16) };
+    let crc = mbm_frame_crc16(unsafe { In::new(data.as_ptr()) }, data.len() as u16);
     [&data[..], &crc.to_le_bytes()].concat()
 }
 
@@ -431,7 +431,7 @@ fn hooks_use_the_server_that_called_them() {
                 (*state).received = if tcp {
                     [&[0, 1, 0, 0, 0, request.len() as u8][..], request].concat()
                 } else {
-                    let crc = mbm_frame_crc16(request.as_ptr(), request.len() as u16);
+                    let crc = mbm_frame_crc16(In::new(request.as_ptr()), request.len() as u16);
                     [request, &crc.to_le_bytes()].concat()
                 };
                 for _ in 0..8 {

@@ -2,7 +2,7 @@
 
 use super::request::{mbm_clientRequest, RequestPtr};
 use crate::packet::{mbm_packet, MBM_PACKET_RESPONSE};
-use crate::pointers::{buffer, overlap, put, required};
+use crate::pointers::{overlap, Out};
 use mbm::client::ClientRequest as _;
 use mbm::error::{Error, Status};
 use mbm::pdu::custom::{Function, Rule};
@@ -82,21 +82,21 @@ fn packet_of(request: RequestPtr, pdu: &mut [u8]) -> Result<mbm_packet, Error> {
 #[no_mangle]
 pub unsafe extern "C" fn mbm_client_reply(
     request: *const mbm_clientRequest,
-    pdu: *mut u8,
+    pdu: Out<u8>,
     capacity: u16,
-    packet: *mut mbm_packet,
+    packet: Out<mbm_packet>,
 ) -> u8 {
     let made = || {
         let request = RequestPtr::new(request.cast_mut());
         let request = request.ok_or(Error::InvalidArgument)?;
-        if request.lies_in(|bytes, length| overlap(bytes, length, pdu, capacity)) {
+        if request.lies_in(|bytes, length| overlap(bytes, length, pdu.pointer(), capacity)) {
             return Err(Error::InvalidArgument);
         }
-        required(packet)?;
-        packet_of(request, buffer(pdu, capacity)?)
+        packet.required()?;
+        packet_of(request, pdu.buffer(capacity)?)
     };
     match made() {
-        Ok(made) => put(packet, made),
+        Ok(made) => packet.put(made),
         Err(refused) => refused.code(),
     }
 }

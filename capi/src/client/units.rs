@@ -4,7 +4,7 @@ use super::object::mbm_client;
 use super::repeat::allow_retries;
 use super::settings::set;
 use super::storage::UnitRecords;
-use crate::pointers::{self, slice_or_empty};
+use crate::pointers::{self, In};
 use mbm::client::{find, note, rest, ClientStorage as _, UnitRecord};
 use mbm::error::Status;
 use mbm::time::LONGEST_TIMEOUT_MS;
@@ -69,7 +69,7 @@ pub unsafe extern "C" fn mbm_client_setUnits(
     count: u8,
 ) -> u8 {
     set(client, |parts| {
-        let records: &[UnitRecord] = slice_or_empty(units.cast(), count.into());
+        let records: &[UnitRecord] = In::new(units.cast()).slice_or_empty(count.into());
         if !records.iter().all(UnitRecord::is_in_range) {
             return Status::INVALID_ARGUMENT;
         }

@@ -5,7 +5,7 @@ use super::{mbm_gateway, Core};
 use crate::client::{mbm_client, mbm_clientRequest, mbm_client_custom};
 use crate::framing::{mbm_framing, MBM_FRAMING_TCP, MBM_MAX_TCP_FRAME};
 use crate::functions::{declared, mbm_function};
-use crate::pointers;
+use crate::pointers::{self, In};
 use crate::server::{have_ids, mbm_unit, mbm_unit_respond};
 use core::ffi::c_void;
 use core::ptr::null;
@@ -99,7 +99,7 @@ unsafe fn serve(
             parts.units,
             parts.unit_count,
             connection,
-            &raw const framing,
+            In::from(&framing),
             frame,
             length,
             MBM_MAX_TCP_FRAME,
@@ -120,18 +120,19 @@ unsafe fn serve(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_gateway_setFunctions(
     gateway: *mut mbm_gateway,
-    functions: *const mbm_function,
+    functions: In<mbm_function>,
     count: u8,
 ) -> u8 {
     pointers::with(gateway, |core: *mut Core| {
-        let is_valid = pointers::slice(functions, count.into())
+        let is_valid = functions
+            .slice(count.into())
             .and_then(|functions| declared(functions, None))
             .is_ok();
         if !is_valid {
             return Status::INVALID_ARGUMENT;
         }
         let parts = &mut (*core).storage;
-        parts.functions = functions;
+        parts.functions = functions.pointer();
         parts.function_count = count;
         parts.forward_declared = if count > 0 {
             Some(forward_declared)

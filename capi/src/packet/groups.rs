@@ -2,7 +2,7 @@
 
 use super::{mbm_packet, side, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
 use crate::functions::MBM_MEI_READ_DEVICE_IDENTIFICATION;
-use crate::pointers::{buffer, get, overlap, put, required, slice};
+use crate::pointers::{overlap, In, Out};
 use mbm::error::{Error, Status};
 use mbm::packet::groups;
 use mbm::pdu::files::Record;
@@ -38,22 +38,19 @@ pub struct mbm_object {
 }
 
 /// Reads the group at the cursor with `first`, and moves the cursor past it.
-///
-/// # Safety
-/// The pointers are NULL or valid.
-unsafe fn next<T>(
-    packet: *const mbm_packet,
-    cursor: *mut u16,
-    group: *mut T,
+fn next<T>(
+    packet: In<mbm_packet>,
+    cursor: Out<u16>,
+    group: Out<T>,
     first: impl FnOnce(&mbm_packet, &[u8]) -> Option<(T, usize)>,
 ) -> u8 {
     let found = || {
-        required(group).ok()?;
-        let (packet, at) = (get(packet).ok()?, get(cursor).ok()?);
+        group.required().ok()?;
+        let (packet, at) = (packet.get().ok()?, cursor.get().ok()?);
         let rest = packet.data().ok()?.get(at.into()..)?;
         let (found, length) = first(&packet, rest)?;
-        put(cursor, at.saturating_add(length as u16));
-        put(group, found);
+        cursor.put(at.saturating_add(length as u16));
+        group.put(found);
         Some(())
     };
     found().is_some().into()
@@ -70,10 +67,10 @@ unsafe fn next<T>(
 /// @return 1 if there is a record. 0, with `cursor` and `record` unchanged, if there are no more
 ///         records, and for NULL
 #[no_mangle]
-pub unsafe extern "C" fn mbm_packet_nextRecord(
-    packet: *const mbm_packet,
-    cursor: *mut u16,
-    record: *mut mbm_record,
+pub extern "C" fn mbm_packet_nextRecord(
+    packet: In<mbm_packet>,
+    cursor: Out<u16>,
+    record: Out<mbm_record>,
 ) -> u8 {
     let first = |packet: &mbm_packet, rest: &[u8]| {
         let side = side(packet.kind).ok()?;
@@ -104,10 +101,10 @@ pub unsafe extern "C" fn mbm_packet_nextRecord(
 /// @return 1 if there is an object. 0, with `cursor` and `object` unchanged, if there are no
 ///         more objects, and for NULL
 #[no_mangle]
-pub unsafe extern "C" fn mbm_packet_nextObject(
-    packet: *const mbm_packet,
-    cursor: *mut u16,
-    object: *mut mbm_object,
+pub extern "C" fn mbm_packet_nextObject(
+    packet: In<mbm_packet>,
+    cursor: Out<u16>,
+    object: Out<mbm_object>,
 ) -> u8 {
     let first = |packet: &mbm_packet, rest: &[u8]| {
         if !packet.has_objects() {
@@ -134,31 +131,29 @@ impl mbm_packet {
 
 /// Writes a group after the other groups of a packet, which are in `storage`, and adds
 /// its length to dataLength.
-///
-/// # Safety
-/// The pointers are NULL or valid.
-unsafe fn add(
-    packet: *mut mbm_packet,
-    storage: *mut u8,
+fn add(
+    packet: Out<mbm_packet>,
+    storage: Out<u8>,
     capacity: u16,
     (data, length): (*const u8, u16),
     write: impl FnOnce(&mut mbm_packet, &[u8], &mut [u8]) -> Result<usize, Error>,
 ) -> Result<(), Error> {
     let refused = Error::InvalidArgument;
     // Data and storage do not overlap.
-    let mut extended = get(packet)?;
-    let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage);
-    if !is_contiguous || (length > 0 && overlap(data, length, storage, capacity)) {
+    let mut extended = packet.get()?;
+    let is_contiguous = extended.dataLength == 0 || core::ptr::eq(extended.data, storage.pointer());
+    if !is_contiguous || (length > 0 && overlap(data, length, storage.pointer(), capacity)) {
         return Err(refused);
     }
-    let data = slice(data, length.into())?;
-    let place = buffer(storage, capacity)?;
+    // SAFETY: the record or object has these data, as C says.
+    let data = unsafe { In::new(data) }.slice(length.into())?;
+    let place = storage.buffer(capacity)?;
     let used = extended.dataLength;
     let space = place.get_mut(used.into()..).ok_or(refused)?;
     let more = write(&mut extended, data, space)?;
-    extended.data = storage;
+    extended.data = place.as_ptr();
     extended.dataLength = used.saturating_add(more as u16);
-    put(packet, extended);
+    packet.put(extended);
     Ok(())
 }
 
@@ -175,13 +170,13 @@ unsafe fn add(
 ///         MBM_INVALID_ARGUMENT for an exception packet, record data that overlap `storage`, or
 ///         packet data that are not in `storage`
 #[no_mangle]
-pub unsafe extern "C" fn mbm_packet_addRecord(
-    packet: *mut mbm_packet,
-    storage: *mut u8,
+pub extern "C" fn mbm_packet_addRecord(
+    packet: Out<mbm_packet>,
+    storage: Out<u8>,
     capacity: u16,
-    record: *const mbm_record,
+    record: In<mbm_record>,
 ) -> u8 {
-    let (Ok(added), Ok(current)) = (get(record), get(packet)) else {
+    let (Ok(added), Ok(current)) = (record.get(), packet.get()) else {
         return Status::INVALID_ARGUMENT.code();
     };
     // A request of function 14 names the registers and has no data.
@@ -217,13 +212,13 @@ pub unsafe extern "C" fn mbm_packet_addRecord(
 ///         packet is no such response; MBM_INVALID_ARGUMENT for object data that overlap
 ///         `storage`, or packet data that are not in `storage`
 #[no_mangle]
-pub unsafe extern "C" fn mbm_packet_addObject(
-    packet: *mut mbm_packet,
-    storage: *mut u8,
+pub extern "C" fn mbm_packet_addObject(
+    packet: Out<mbm_packet>,
+    storage: Out<u8>,
     capacity: u16,
-    object: *const mbm_object,
+    object: In<mbm_object>,
 ) -> u8 {
-    let Ok(added) = get(object) else {
+    let Ok(added) = object.get() else {
         return Status::INVALID_ARGUMENT.code();
     };
     let write = |packet: &mut mbm_packet, value: &[u8], space: &mut [u8]| {

@@ -6,8 +6,7 @@ mod groups;
 
 pub use groups::*;
 
-use super::functions::{declared, mbm_function};
-use super::pointers::{overlap, put, slice};
+use super::pointers::{overlap, In, Out};
 use mbm::error::{Error, Status};
 use mbm::packet::{self, PduKind};
 use mbm::pdu::custom::Function;
@@ -158,11 +157,9 @@ pub(super) fn side(kind: u8) -> Result<PduKind, Error> {
 
 impl mbm_packet {
     /// The data of the packet; an error for a NULL pointer with a length.
-    ///
-    /// # Safety
-    /// `data` is NULL or points to `dataLength` bytes.
-    pub(super) unsafe fn data<'a>(&self) -> Result<&'a [u8], Error> {
-        slice(self.data, self.dataLength.into())
+    pub(super) fn data<'a>(&self) -> Result<&'a [u8], Error> {
+        // SAFETY: C made the packet, and its comment says so of the data.
+        unsafe { In::new(self.data) }.slice(self.dataLength.into())
     }
 
     /// True if the data overlap a buffer that is to be written.
@@ -221,23 +218,8 @@ impl mbm_packet {
     }
 }
 
-/// The declaration of a function code in the array of C, or `None` without one.
-///
-/// # Safety
-/// `functions` is NULL or points to `count` declarations.
-pub(super) unsafe fn own(
-    functions: *const mbm_function,
-    count: u8,
-    code: Option<u8>,
-) -> Result<Option<Function>, Error> {
-    declared(slice(functions, count.into())?, code)
-}
-
 /// Measures the reply to a request. Fails for a request that cannot be built.
-///
-/// # Safety
-/// As for [`mbm_packet::data`].
-pub(super) unsafe fn reply_length(
+pub(super) fn reply_length(
     packet: &mut mbm_packet,
     functions: &[Function],
     measure: impl FnOnce(&Request) -> Length,
@@ -252,15 +234,12 @@ pub(super) unsafe fn reply_length(
 
 /// Writes a length for C. Without a length it writes MBM_LENGTH_UNKNOWN and returns the
 /// status that says why.
-///
-/// # Safety
-/// As for [`put`].
-pub(super) unsafe fn put_expected(place: *mut mbm_length, length: Result<Length, Error>) -> u8 {
+pub(super) fn put_expected(place: Out<mbm_length>, length: Result<Length, Error>) -> u8 {
     let known = match length {
         Ok(length) => length,
         Err(_) => Length::Unknown,
     };
-    let status = put(place, known.into());
+    let status = place.put(known.into());
     match length {
         Err(refused) if status == Status::OK.code() => refused.code(),
         _ => status,

@@ -4,7 +4,7 @@ use super::mbm_plan;
 use super::setup::mbm_planSetup;
 use crate::client::object::queue;
 use crate::client::{self, mbm_client, mbm_client_cancel};
-use crate::pointers;
+use crate::pointers::{self, Out};
 use core::ptr::null_mut;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use mbm::error::Status;
@@ -42,7 +42,7 @@ pub unsafe extern "C" fn mbm_plan_begin(
     plan: *mut mbm_plan,
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
-    field: *mut u16,
+    field: Out<u16>,
 ) -> u8 {
     let group = |setup: &mbm_planSetup, unit_0, positions: &mut [Position], reads: &mut [Read]| {
         group::group(
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn mbm_plan_beginGrouped(
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
     counts: *const u16,
-    field: *mut u16,
+    field: Out<u16>,
 ) -> u8 {
     let group = |setup: &mbm_planSetup, unit_0, positions: &mut [Position], reads: &mut [Read]| {
         let counts = from_raw_parts(counts, reads.len());
@@ -105,14 +105,14 @@ unsafe fn begin(
     plan: *mut mbm_plan,
     client: *mut mbm_client,
     setup: *const mbm_planSetup,
-    field: *mut u16,
+    field: Out<u16>,
     is_usable: bool,
     group: impl FnOnce(&mbm_planSetup, u8, &mut [Position], &mut [Read]) -> Result<usize, Refusal>,
 ) -> u8 {
     let mut wrong = u16::MAX;
     // `field` is NULL or what the header says.
     let status = attempt(plan, client, setup, is_usable, group, &mut wrong);
-    pointers::put(field, wrong);
+    field.put(wrong);
     status.code()
 }
 

@@ -4,7 +4,7 @@
 use super::mbm_plan;
 use super::setup::mbm_planField;
 use super::values::{find, find_words};
-use crate::pointers::{self, slice};
+use crate::pointers::{In, Out};
 use crate::registers::{mbm_registers, view, MBM_ORDER_DEFAULT};
 use core::mem::MaybeUninit;
 use mbm::data::order::Order;
@@ -51,17 +51,14 @@ pub struct mbm_planConversion {
 }
 
 /// What a conversion says of a field by itself, and its power field.
-///
-/// # Safety
-/// `from` is NULL or points to a conversion.
-unsafe fn conversion<'a>(
-    from: *const mbm_planConversion,
-) -> Result<(Conversion<'a>, Option<u16>), Error> {
-    let Some(from) = from.as_ref() else {
+fn conversion<'a>(from: In<mbm_planConversion>) -> Result<(Conversion<'a>, Option<u16>), Error> {
+    let Some(from) = from.value() else {
         return Ok((Conversion::default(), None));
     };
+    // SAFETY: C filled in the conversion as its comment says.
+    let not_available = unsafe { In::new(from.notAvailable) };
     let conversion = Conversion {
-        not_available: slice(from.notAvailable, from.notAvailableCount.into())?,
+        not_available: not_available.slice(from.notAvailableCount.into())?,
         is_standard: from.flags & MBM_CONVERSION_STANDARD != 0,
         offset: from.offset,
         offset_decimals: from.offsetDecimals,
@@ -98,11 +95,11 @@ unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    from: *const mbm_planConversion,
-    place: *mut T,
+    from: In<mbm_planConversion>,
+    place: Out<T>,
     get: impl FnOnce(&Words, &Conversion, i8) -> Result<T, Error>,
 ) -> u8 {
-    let result = pointers::put_result(place, || {
+    let result = place.put_result(|| {
         let mut words = MaybeUninit::uninit();
         find_words(plan, field, index, &mut words).result()?;
         let (conversion, power_field) = conversion(from)?;
@@ -116,20 +113,17 @@ unsafe fn get<T>(
 }
 
 /// Finds a value in registers and puts it where C wants it.
-///
-/// # Safety
-/// As the header demands; `place` is NULL or points to a `T`.
-unsafe fn find_in<T>(
-    registers: *const mbm_registers,
-    fields: *const mbm_planField,
+fn find_in<T>(
+    registers: In<mbm_registers>,
+    fields: In<mbm_planField>,
     field: u16,
     index: u16,
-    from: *const mbm_planConversion,
-    place: *mut T,
+    from: In<mbm_planConversion>,
+    place: Out<T>,
     get: impl FnOnce(&Words, &Conversion, i8) -> Result<T, Error>,
 ) -> u8 {
-    let result = pointers::put_result(place, || {
-        pointers::required(fields)?;
+    let result = place.put_result(|| {
+        fields.required()?;
         let (conversion, power_field) = conversion(from)?;
         let power = match power_field {
             Some(of) => with_words(registers, fields, of, 0, power)?,
@@ -143,17 +137,15 @@ unsafe fn find_in<T>(
 }
 
 /// Calls `use_words` with the words of a value in registers.
-///
-/// # Safety
-/// As the header demands; `fields` has this field.
-unsafe fn with_words<T>(
-    registers: *const mbm_registers,
-    fields: *const mbm_planField,
+fn with_words<T>(
+    registers: In<mbm_registers>,
+    fields: In<mbm_planField>,
     field: u16,
     index: u16,
     use_words: impl FnOnce(&Words) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let mut own: Field = *fields.add(field.into()).cast();
+    // SAFETY: the table has this field, as C says.
+    let mut own: Field = unsafe { *fields.pointer().add(field.into()).cast() };
     own.check(1).result()?;
     if own.is_in_bits() {
         return Err(Error::InvalidArgument);
@@ -212,7 +204,7 @@ functions! {
     ///         MBM_TYPE_REGISTERS, and for a conversion that is not as it must be; if no value has
     ///         arrived yet the status that mbm_plan_getStatus returns
     fn mbm_plan_getConverted(
-        field: u16, index: u16, conversion: *const mbm_planConversion, value: *mut f64
+        field: u16, index: u16, conversion: In<mbm_planConversion>, value: Out<f64>
     ) = get(field, index, conversion, value.cast(), |words, with, power| {
         words.converted(with, power).map(double)
     });
@@ -226,7 +218,7 @@ functions! {
     /// @return as mbm_plan_getConverted; MBM_OUT_OF_RANGE if the result, or a number on the way to
     ///         it, is too large: number * multiplier * 10^(power + decimals) must be below 2^64
     fn mbm_plan_getDecimal(
-        field: u16, index: u16, conversion: *const mbm_planConversion, decimals: u8, value: *mut i32
+        field: u16, index: u16, conversion: In<mbm_planConversion>, decimals: u8, value: Out<i32>
     ) = get(field, index, conversion, value, |words, with, power| {
         words.decimal(with, power, decimals)
     });
@@ -236,12 +228,12 @@ functions! {
     ///
     /// @param field  the index of the field, of any type
     /// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_plan_getConverted
-    fn mbm_plan_checkAvailable(field: u16, index: u16, conversion: *const mbm_planConversion)
-        = get(field, index, conversion, &mut (), |words, with, _| words.available(with));
+    fn mbm_plan_checkAvailable(field: u16, index: u16, conversion: In<mbm_planConversion>)
+        = get(field, index, conversion, Out::from(&mut ()), |words, with, _| words.available(with));
 }
 
 functions! {
-    (registers: *const mbm_registers)
+    (registers: In<mbm_registers>)
 
     /// As mbm_plan_getConverted, for registers that a program has read without a plan. On a
     /// Cortex-M it takes 420 bytes of stack.
@@ -256,8 +248,8 @@ functions! {
     /// @return as mbm_plan_getConverted; MBM_ILLEGAL_DATA_ADDRESS if `registers` lack one that is
     ///         needed; otherwise a status as mbm_plan_begin for the field; see mbm_registers
     fn mbm_registers_getConverted(
-        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion,
-        value: *mut f64
+        fields: In<mbm_planField>, field: u16, index: u16, conversion: In<mbm_planConversion>,
+        value: Out<f64>
     ) = find_in(fields, field, index, conversion, value.cast(), |words, with, power| {
         words.converted(with, power).map(double)
     });
@@ -267,8 +259,8 @@ functions! {
     /// @param decimals  0 to 9
     /// @return as mbm_registers_getConverted and mbm_plan_getDecimal
     fn mbm_registers_getDecimal(
-        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion,
-        decimals: u8, value: *mut i32
+        fields: In<mbm_planField>, field: u16, index: u16, conversion: In<mbm_planConversion>,
+        decimals: u8, value: Out<i32>
     ) = find_in(fields, field, index, conversion, value, |words, with, power| {
         words.decimal(with, power, decimals)
     });
@@ -277,6 +269,6 @@ functions! {
     ///
     /// @return MBM_OK or MBM_NOT_AVAILABLE, or another status as mbm_registers_getConverted
     fn mbm_registers_checkAvailable(
-        fields: *const mbm_planField, field: u16, index: u16, conversion: *const mbm_planConversion
-    ) = find_in(fields, field, index, conversion, &mut (), |words, with, _| words.available(with));
+        fields: In<mbm_planField>, field: u16, index: u16, conversion: In<mbm_planConversion>
+    ) = find_in(fields, field, index, conversion, Out::from(&mut ()), |words, with, _| words.available(with));
 }

@@ -2,7 +2,7 @@
 
 use super::mbm_plan;
 use crate::client::mbm_clientRequest;
-use crate::pointers;
+use crate::pointers::In;
 use core::ffi::c_void;
 use core::mem::offset_of;
 use core::slice::from_raw_parts;
@@ -215,11 +215,11 @@ impl ReadLimits for mbm_planSetup {
 
     fn units(&self) -> &[UnitLimits] {
         // SAFETY: as above.
-        unsafe { pointers::slice_or_empty(self.units.cast(), self.unitCount.into()) }
+        unsafe { In::new(self.units.cast()).slice_or_empty(self.unitCount.into()) }
     }
 
     fn excluded(&self) -> &[ExcludedRange] {
         // SAFETY: as above.
-        unsafe { pointers::slice_or_empty(self.excluded.cast(), self.excludedCount.into()) }
+        unsafe { In::new(self.excluded.cast()).slice_or_empty(self.excludedCount.into()) }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::mbm_plan;
 use super::object::{time, Object};
-use crate::pointers::{self, slice_mut};
+use crate::pointers::{self, Out};
 use crate::registers::{mbm_registers, MBM_REGISTERS_OF_WORDS};
 use core::ffi::c_char;
 use core::mem::MaybeUninit;
@@ -114,11 +114,11 @@ unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    place: *mut T,
+    place: Out<T>,
     find: impl FnOnce(&Words) -> Result<T, Error>,
 ) -> u8 {
     let mut words = MaybeUninit::uninit();
-    let result = pointers::put_result(place, || {
+    let result = place.put_result(|| {
         find_words(plan, field, index, &mut words).result()?;
         find(words.assume_init_ref())
     });
@@ -138,7 +138,7 @@ unsafe fn get<T>(
 pub unsafe extern "C" fn mbm_plan_getStatus(
     plan: *mut mbm_plan,
     field: u16,
-    ageMs: *mut u32,
+    ageMs: Out<u32>,
 ) -> u8 {
     let mut found = MaybeUninit::uninit();
     match find(plan, field, &mut found) {
@@ -147,14 +147,11 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
     }
     let Found { object, read, .. } = found.assume_init();
     let now = time(object);
-    pointers::put(
-        ageMs,
-        if read.has_data() {
-            read.age(now)
-        } else {
-            u32::MAX
-        },
-    );
+    ageMs.put(if read.has_data() {
+        read.age(now)
+    } else {
+        u32::MAX
+    });
     read.status().code()
 }
 
@@ -172,7 +169,7 @@ pub unsafe extern "C" fn mbm_plan_getInteger(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    value: *mut i64,
+    value: Out<i64>,
 ) -> u8 {
     get(plan, field, index, value, |words| words.integer())
 }
@@ -187,7 +184,7 @@ pub unsafe extern "C" fn mbm_plan_getInt32(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    value: *mut i32,
+    value: Out<i32>,
 ) -> u8 {
     get(plan, field, index, value, |words| words.int32())
 }
@@ -204,7 +201,7 @@ pub unsafe extern "C" fn mbm_plan_getNumber(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    value: *mut f64,
+    value: Out<f64>,
 ) -> u8 {
     // A double is its bits.
     #[cfg(not(target_arch = "avr"))]
@@ -229,7 +226,7 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
     plan: *const mbm_plan,
     field: u16,
     index: u16,
-    value: *mut f32,
+    value: Out<f32>,
 ) -> u8 {
     // A float is its bits.
     get(plan, field, index, value.cast(), |words| words.float())
@@ -246,19 +243,19 @@ pub unsafe extern "C" fn mbm_plan_getFloat(
 pub unsafe extern "C" fn mbm_plan_getText(
     plan: *const mbm_plan,
     field: u16,
-    text: *mut c_char,
+    text: Out<c_char>,
     capacity: u16,
 ) -> u8 {
+    if text.is_null() {
+        return Status::INVALID_ARGUMENT.code();
+    }
     let copy = |words: &Words| {
-        let text = slice_mut::<u8>(text.cast(), capacity.into())?;
+        let text = text.cast::<u8>().slice(capacity.into())?;
         let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let count = words.text(place)?;
         *place.get_mut(count).unwrap_or(end) = 0;
         Ok(())
     };
-    if text.is_null() {
-        return Status::INVALID_ARGUMENT.code();
-    }
     let mut words = MaybeUninit::uninit();
     match find_words(plan, field, 0, &mut words) {
         Status::OK => Status::from(copy(words.assume_init_ref())).code(),
@@ -276,7 +273,7 @@ pub unsafe extern "C" fn mbm_plan_getText(
 pub unsafe extern "C" fn mbm_plan_getRegisters(
     plan: *const mbm_plan,
     field: u16,
-    registers: *mut mbm_registers,
+    registers: Out<mbm_registers>,
 ) -> u8 {
     get(plan, field, 0, registers, |words| {
         if words.field.is_in_bits() {
@@ -322,7 +319,7 @@ pub unsafe extern "C" fn mbm_plan_refresh(plan: *mut mbm_plan, field: u16) -> u8
 pub unsafe extern "C" fn mbm_plan_getRead(
     plan: *const mbm_plan,
     index: u16,
-    read: *mut mbm_planReadInfo,
+    read: Out<mbm_planReadInfo>,
 ) -> u8 {
     let find = || {
         pointers::check(plan).result()?;
@@ -337,6 +334,6 @@ pub unsafe extern "C" fn mbm_plan_getRead(
             status: own.status().code(),
         })
     };
-    let found = pointers::put_result(read, find);
+    let found = read.put_result(find);
     Status::from(found).code()
 }

@@ -3,7 +3,7 @@
 use super::get::get_value;
 use super::mbm_registers;
 use super::set::with;
-use crate::pointers;
+use crate::pointers::{In, Out};
 use core::ffi::c_char;
 use core::mem::offset_of;
 use mbm::data::clock::Layout;
@@ -55,14 +55,12 @@ const _: () = {
 /// The longest layout: 32 registers of two letters, and the spaces between them.
 const LONGEST_LAYOUT: usize = 95;
 
-/// # Safety
-/// `layout` is NULL or ends with a NUL.
-unsafe fn layout_of<'a>(layout: *const c_char, is_bcd: u8) -> Result<Layout<'a>, Error> {
-    Layout::new(pointers::text(layout.cast(), LONGEST_LAYOUT)?, is_bcd != 0)
+fn layout_of<'a>(layout: In<c_char>, is_bcd: u8) -> Result<Layout<'a>, Error> {
+    Layout::new(layout.cast().text(LONGEST_LAYOUT)?, is_bcd != 0)
 }
 
 functions! {
-    (registers: *const mbm_registers)
+    (registers: In<mbm_registers>)
 
     /// Reads a date, or a time of day, from registers of which `layout` says what they hold. It has
     /// a letter for each register, or two for its high and low byte, and a space between two
@@ -84,7 +82,7 @@ functions! {
     /// @return a status; see mbm_registers. MBM_MALFORMED_VALUE for a date that does not exist, or a
     ///         digit above 9
     fn mbm_registers_getDate(
-        address: u16, order: u8, layout: *const c_char, isBcd: u8, value: *mut mbm_date
+        address: u16, order: u8, layout: In<c_char>, isBcd: u8, value: Out<mbm_date>
     ) = get_value(order, value.cast(), |registers| {
         registers.date(&layout_of(layout, isBcd)?, registers.order, address)
     });
@@ -95,9 +93,9 @@ functions! {
     /// @return as mbm_registers_setUint16; MBM_INVALID_ARGUMENT for a date that does not exist;
     ///         MBM_OUT_OF_RANGE for one that the layout cannot hold exactly
     fn mbm_registers_setDate(
-        address: u16, order: u8, layout: *const c_char, isBcd: u8, value: *const mbm_date
+        address: u16, order: u8, layout: In<c_char>, isBcd: u8, value: In<mbm_date>
     ) = with(order, |registers| {
-        let date: Date = pointers::get(value.cast())?;
+        let date: Date = value.cast().get()?;
         registers.set_date(&layout_of(layout, isBcd)?, registers.order, address, &date)
     });
 
@@ -108,7 +106,7 @@ functions! {
     /// @param count    how many registers, 3 or 4
     /// @param value    receives the date, 2000 to 2127
     /// @return as mbm_registers_getDate
-    fn mbm_registers_getIecDate(address: u16, count: u16, order: u8, value: *mut mbm_date)
+    fn mbm_registers_getIecDate(address: u16, count: u16, order: u8, value: Out<mbm_date>)
         = get_value(order, value.cast(), |registers| {
             registers.iec870_date(registers.order, address, count)
         });
@@ -117,9 +115,9 @@ functions! {
     ///
     /// @param value    the date
     /// @return as mbm_registers_setDate
-    fn mbm_registers_setIecDate(address: u16, count: u16, order: u8, value: *const mbm_date)
+    fn mbm_registers_setIecDate(address: u16, count: u16, order: u8, value: In<mbm_date>)
         = with(order, |registers| {
-            let date: Date = pointers::get(value.cast())?;
+            let date: Date = value.cast().get()?;
             registers.set_iec870_date(registers.order, address, count, &date)
         });
 }
@@ -131,11 +129,8 @@ functions! {
 /// @param seconds  receives the number, below 0 before 1970
 /// @return a status; MBM_INVALID_ARGUMENT for a date that does not exist
 #[no_mangle]
-pub unsafe extern "C" fn mbm_date_getSeconds(date: *const mbm_date, seconds: *mut i64) -> u8 {
-    Status::from(pointers::put_result(seconds, || {
-        pointers::get::<Date>(date.cast())?.seconds()
-    }))
-    .code()
+pub extern "C" fn mbm_date_getSeconds(date: In<mbm_date>, seconds: Out<i64>) -> u8 {
+    Status::from(seconds.put_result(|| date.cast::<Date>().get()?.seconds())).code()
 }
 
 /// Sets the date that is so many seconds after 1970-01-01 00:00:00, both in UTC.
@@ -144,9 +139,6 @@ pub unsafe extern "C" fn mbm_date_getSeconds(date: *const mbm_date, seconds: *mu
 /// @param seconds  points to the number
 /// @return a status; MBM_OUT_OF_RANGE before the year 1 and after 9999
 #[no_mangle]
-pub unsafe extern "C" fn mbm_date_setSeconds(date: *mut mbm_date, seconds: *const i64) -> u8 {
-    Status::from(pointers::put_result(date.cast(), || {
-        Date::of_seconds(pointers::get(seconds)?)
-    }))
-    .code()
+pub extern "C" fn mbm_date_setSeconds(date: Out<mbm_date>, seconds: In<i64>) -> u8 {
+    Status::from(date.cast().put_result(|| Date::of_seconds(seconds.get()?))).code()
 }

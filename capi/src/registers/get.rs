@@ -1,7 +1,7 @@
 //! Reads values from registers. A call that fails leaves the caller's value unchanged.
 
 use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
-use crate::pointers::{self, slice, slice_mut};
+use crate::pointers::{In, Out};
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
@@ -9,44 +9,29 @@ use mbm::data::view::Registers;
 use mbm::error::{Error, Status};
 
 /// Writes the value that `find` returns to `value`.
-///
-/// # Safety
-/// As for [`view`]; `value` is NULL or points to a `T`.
-pub(super) unsafe fn get_value<T>(
-    registers: *const mbm_registers,
+pub(super) fn get_value<T>(
+    registers: In<mbm_registers>,
     order: u8,
-    value: *mut T,
+    value: Out<T>,
     find: impl FnOnce(&Registers<BorrowedRegisters>) -> Result<T, Error>,
 ) -> u8 {
-    code(
-        view(registers, order, false)
-            .and_then(|registers| pointers::put_result(value, || find(&registers))),
-    )
+    code(view(registers, order, false).and_then(|registers| value.put_result(|| find(&registers))))
 }
 
 /// Writes the bytes of a number to `number`, in the byte order of this machine. One
 /// function for all numbers of a size keeps the code small.
-///
-/// # Safety
-/// As for [`view`]; `number` is NULL or points to `size` bytes.
-unsafe fn get(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    number: *mut u8,
-    size: usize,
-) -> u8 {
+fn get(registers: In<mbm_registers>, address: u16, order: u8, number: Out<u8>, size: usize) -> u8 {
     if number.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
     code(view(registers, order, false).and_then(|registers| {
         let mask = registers.order.mask(size) ^ machine_order_mask(size);
-        registers.load(address, mask, slice_mut(number, size)?)
+        registers.load(address, mask, number.slice(size)?)
     }))
 }
 
 functions! {
-    (registers: *const mbm_registers)
+    (registers: In<mbm_registers>)
 
     /// Reads one bit of a register.
     ///
@@ -54,7 +39,7 @@ functions! {
     /// @param bit      0, the least significant, to 15
     /// @param on       receives 0 or 1
     /// @return a status; see mbm_registers
-    fn mbm_registers_getBit(address: u16, bit: u8, on: *mut u8)
+    fn mbm_registers_getBit(address: u16, bit: u8, on: Out<u8>)
         = get_value(MBM_ORDER_DEFAULT, on, |registers| registers.bit(address, bit).map(u8::from));
 
     /// Reads one byte of a register, 0 to 255.
@@ -64,11 +49,11 @@ functions! {
     ///                 first. No order of `registers` exchanges them
     /// @param value    receives the byte
     /// @return a status; see mbm_registers
-    fn mbm_registers_getUint8(address: u16, high: u8, value: *mut u8)
+    fn mbm_registers_getUint8(address: u16, high: u8, value: Out<u8>)
         = get_value(MBM_ORDER_DEFAULT, value, |registers| registers.u8(address, high != 0));
 
     /// As mbm_registers_getUint8, for a signed byte in two's complement, -128 to 127.
-    fn mbm_registers_getInt8(address: u16, high: u8, value: *mut i8)
+    fn mbm_registers_getInt8(address: u16, high: u8, value: Out<i8>)
         = get_value(MBM_ORDER_DEFAULT, value, |registers| registers.i8(address, high != 0));
 
     /// Compares registers with bytes, in the order of the wire: the high byte of each register
@@ -80,9 +65,9 @@ functions! {
     /// @param length   how many bytes, two for each register; may be odd
     /// @param equal    receives 1 if all bytes are equal, otherwise 0. It is 1 for no bytes
     /// @return a status; see mbm_registers
-    fn mbm_registers_isEqualBytes(address: u16, bytes: *const u8, length: u16, equal: *mut u8)
+    fn mbm_registers_isEqualBytes(address: u16, bytes: In<u8>, length: u16, equal: Out<u8>)
         = get_value(MBM_ORDER_DEFAULT, equal, |registers| {
-            let is_equal = registers.is_equal(address, slice(bytes, length.into())?)?;
+            let is_equal = registers.is_equal(address, bytes.slice(length.into())?)?;
             Ok(is_equal.into())
         });
 
@@ -93,28 +78,28 @@ functions! {
     /// @param order    one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
     /// @param value    receives the number
     /// @return a status; see mbm_registers
-    fn mbm_registers_getUint16(address: u16, order: u8, value: *mut u16)
+    fn mbm_registers_getUint16(address: u16, order: u8, value: Out<u16>)
         = get(address, order, value.cast(), 2);
 
     /// Reads a number of two registers, 0 to 4294967295. For a signed number (two's
     /// complement), pass a pointer to an int32_t, cast to uint32_t *.
     ///
     /// @return as mbm_registers_getUint16
-    fn mbm_registers_getUint32(address: u16, order: u8, value: *mut u32)
+    fn mbm_registers_getUint32(address: u16, order: u8, value: Out<u32>)
         = get(address, order, value.cast(), 4);
 
     /// Reads a number of four registers. For a signed number, pass a pointer to an int64_t,
     /// cast to uint64_t *.
     ///
     /// @return as mbm_registers_getUint16
-    fn mbm_registers_getUint64(address: u16, order: u8, value: *mut u64)
+    fn mbm_registers_getUint64(address: u16, order: u8, value: Out<u64>)
         = get(address, order, value.cast(), 8);
 
     /// Reads a float of two registers, an IEEE 754 binary32. Its bits are copied, also those
     /// of a NaN.
     ///
     /// @return as mbm_registers_getUint16
-    fn mbm_registers_getFloat(address: u16, order: u8, value: *mut f32)
+    fn mbm_registers_getFloat(address: u16, order: u8, value: Out<f32>)
         = get(address, order, value.cast(), 4);
 }
 
@@ -123,11 +108,11 @@ functions! {
 ///
 /// @return as mbm_registers_getUint16
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getDouble(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_getDouble(
+    registers: In<mbm_registers>,
     address: u16,
     order: u8,
-    value: *mut f64,
+    value: Out<f64>,
 ) -> u8 {
     #[cfg(not(target_arch = "avr"))]
     {
@@ -137,13 +122,13 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
     #[cfg(target_arch = "avr")]
     {
         let mut bytes = [0; 8];
-        let status = get(registers, address, order, bytes.as_mut_ptr(), 8);
+        let status = get(registers, address, order, Out::from(&mut bytes).cast(), 8);
         if status != Status::OK.code() {
             return status;
         }
         bytes.reverse();
         let double = ShortDouble::from_bytes(bytes);
-        code(pointers::put_result(value.cast(), || Ok(double)))
+        code(value.cast().put_result(|| Ok(double)))
     }
 }
 
@@ -161,19 +146,19 @@ pub unsafe extern "C" fn mbm_registers_getDouble(
 /// @param capacity  size of `text` in bytes; `length + 1` are always enough
 /// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getString(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_getString(
+    registers: In<mbm_registers>,
     address: u16,
     length: u16,
     order: u8,
-    text: *mut c_char,
+    text: Out<c_char>,
     capacity: u16,
 ) -> u8 {
     if text.is_null() {
         return Status::INVALID_ARGUMENT.code();
     }
     code(view(registers, order, false).and_then(|registers| {
-        let text = slice_mut::<u8>(text.cast(), capacity.into())?;
+        let text = text.cast::<u8>().slice(capacity.into())?;
         let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let count = registers.text(address, length.into(), place)?.len();
         *place.get_mut(count).unwrap_or(end) = 0;
@@ -191,15 +176,15 @@ pub unsafe extern "C" fn mbm_registers_getString(
 /// @param length   how many bytes, two for each register; may be odd
 /// @return a status; see mbm_registers
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getBytes(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_getBytes(
+    registers: In<mbm_registers>,
     address: u16,
     order: u8,
-    bytes: *mut u8,
+    bytes: Out<u8>,
     length: u16,
 ) -> u8 {
     code(view(registers, order, false).and_then(|registers| {
-        let bytes = slice_mut(bytes, length.into())?;
+        let bytes = bytes.slice(length.into())?;
         registers.bytes_in(registers.order, address, bytes)
     }))
 }

@@ -13,7 +13,7 @@ pub use set::*;
 pub use text_form::*;
 pub use types::*;
 
-use super::pointers;
+use super::pointers::{In, Out};
 use core::ffi::c_void;
 use mbm::data::order::Order;
 use mbm::data::view::{RegisterBytes, RegisterBytesMut, Registers};
@@ -105,8 +105,8 @@ pub(crate) struct BorrowedRegisters {
     swapped: usize,
 }
 
-// SAFETY, here and below: the caller of [`view`] promises that `bytes` points to `length`
-// bytes, which nothing else uses meanwhile. Each access is checked against `length`.
+// SAFETY, here and below: C filled in the `mbm_registers` as its comment says, so `bytes` points to
+// `length` bytes, which nothing else uses meanwhile. Each access is checked against `length`.
 impl RegisterBytes for BorrowedRegisters {
     fn length(&self) -> usize {
         self.length
@@ -128,16 +128,12 @@ impl RegisterBytesMut for BorrowedRegisters {
 }
 
 /// The registers of an `mbm_registers`, with the order of this call.
-///
-/// # Safety
-/// `registers` is NULL or points to an `mbm_registers`. Its `data` is NULL or points to as many
-/// words as the other fields say. Nothing else uses these words while the result lives.
-pub(crate) unsafe fn view(
-    registers: *const mbm_registers,
+pub(crate) fn view(
+    registers: In<mbm_registers>,
     call_order: u8,
     to_write: bool,
 ) -> Result<Registers<BorrowedRegisters>, Error> {
-    let fields = pointers::get(registers)?;
+    let fields = registers.get()?;
     if fields.data.is_null() {
         return Err(Error::NotInitialised);
     }
@@ -169,11 +165,8 @@ const fn machine_order_mask(size: usize) -> usize {
 
 /// Fills a view in. If the arguments are invalid, the view has no data. `data` may be NULL only
 /// if `length`, in words or bytes, is 0.
-///
-/// # Safety
-/// `registers` is NULL or points to an `mbm_registers`, with any content.
-unsafe fn fill(
-    registers: *mut mbm_registers,
+fn fill(
+    registers: Out<mbm_registers>,
     data: *const c_void,
     kind: u8,
     length: u16,
@@ -202,21 +195,18 @@ unsafe fn fill(
         core::ptr::null()
     };
     let order = MBM_ORDER_ABCD;
-    // SAFETY: not NULL, so it points to a view.
-    unsafe {
-        registers.write(mbm_registers {
-            data,
-            first,
-            count,
-            kind,
-            order,
-        })
-    };
+    registers.put(mbm_registers {
+        data,
+        first,
+        count,
+        kind,
+        order,
+    });
     status.code()
 }
 
 functions! {
-    (registers: *mut mbm_registers)
+    (registers: Out<mbm_registers>)
 
     /// Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
     /// until you set `registers->order`. Nothing is copied: the view always shows the present
@@ -228,8 +218,8 @@ functions! {
     /// @param count      how many words
     /// @param first      the device's address of the first register, 0 to 65535
     /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the last address is greater than 65535
-    fn mbm_registers_ofWords(words: *const u16, count: u16, first: u16)
-        = fill(words.cast(), MBM_REGISTERS_OF_WORDS, count, first);
+    fn mbm_registers_ofWords(words: In<u16>, count: u16, first: u16)
+        = fill(words.pointer().cast(), MBM_REGISTERS_OF_WORDS, count, first);
 
     /// As mbm_registers_ofWords, for the data bytes of a reply or a request.
     ///
@@ -237,21 +227,21 @@ functions! {
     ///                   valid while the view is used
     /// @param length     how many bytes, an even number
     /// @return a status; see mbm_registers_ofWords. MBM_INVALID_ARGUMENT for an odd length
-    fn mbm_registers_ofBytes(bytes: *const u8, length: u16, first: u16)
-        = fill(bytes.cast(), MBM_REGISTERS_OF_BYTES, length, first);
+    fn mbm_registers_ofBytes(bytes: In<u8>, length: u16, first: u16)
+        = fill(bytes.pointer().cast(), MBM_REGISTERS_OF_BYTES, length, first);
 
     /// As mbm_registers_ofWords, for words that you also write, for example the transmit
     /// words of mbm_node.
     ///
     /// @return a status; see mbm_registers_ofWords
-    fn mbm_registers_intoWords(words: *mut u16, count: u16, first: u16)
-        = fill(words.cast(), MBM_REGISTERS_INTO_WORDS, count, first);
+    fn mbm_registers_intoWords(words: Out<u16>, count: u16, first: u16)
+        = fill(words.pointer().cast(), MBM_REGISTERS_INTO_WORDS, count, first);
 
     /// As mbm_registers_ofBytes, for bytes that you also write.
     ///
     /// @return a status; see mbm_registers_ofBytes
-    fn mbm_registers_intoBytes(bytes: *mut u8, length: u16, first: u16)
-        = fill(bytes.cast(), MBM_REGISTERS_INTO_BYTES, length, first);
+    fn mbm_registers_intoBytes(bytes: Out<u8>, length: u16, first: u16)
+        = fill(bytes.pointer().cast(), MBM_REGISTERS_INTO_BYTES, length, first);
 
     /// Sets the order of the values that calls with MBM_ORDER_DEFAULT read and write.
     ///
@@ -261,11 +251,8 @@ functions! {
 }
 
 /// Sets the order of a view.
-///
-/// # Safety
-/// `registers` is NULL or points to an `mbm_registers`.
-unsafe fn set_order(registers: *mut mbm_registers, code: u8) -> u8 {
-    let status = match registers.as_mut() {
+fn set_order(registers: Out<mbm_registers>, code: u8) -> u8 {
+    let status = match registers.value() {
         None => Status::INVALID_ARGUMENT,
         Some(registers) if registers.data.is_null() => Status::NOT_INITIALISED,
         Some(registers) => {

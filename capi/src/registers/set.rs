@@ -4,7 +4,7 @@
 //! pass them by value in different ways.
 
 use super::{code, machine_order_mask, mbm_registers, view, BorrowedRegisters, MBM_ORDER_DEFAULT};
-use crate::pointers::{self, slice};
+use crate::pointers::In;
 use core::ffi::c_char;
 #[cfg(target_arch = "avr")]
 use mbm::data::value::{ShortDouble, Value};
@@ -12,11 +12,8 @@ use mbm::data::view::Registers;
 use mbm::error::Error;
 
 /// Runs `action` on registers that may be written.
-///
-/// # Safety
-/// As for [`view`].
-pub(super) unsafe fn with(
-    registers: *const mbm_registers,
+pub(super) fn with(
+    registers: In<mbm_registers>,
     order: u8,
     action: impl FnOnce(&mut Registers<BorrowedRegisters>) -> Result<(), Error>,
 ) -> u8 {
@@ -25,24 +22,15 @@ pub(super) unsafe fn with(
 
 /// Sets a number from its bytes in the byte order of this machine. One function for all
 /// numbers of a size keeps the code small.
-///
-/// # Safety
-/// As for [`view`]; `number` is NULL or points to `size` bytes.
-unsafe fn set(
-    registers: *const mbm_registers,
-    address: u16,
-    order: u8,
-    number: *const u8,
-    size: usize,
-) -> u8 {
+fn set(registers: In<mbm_registers>, address: u16, order: u8, number: In<u8>, size: usize) -> u8 {
     with(registers, order, |registers| {
         let mask = registers.order.mask(size) ^ machine_order_mask(size);
-        registers.store(address, mask, slice(number, size)?)
+        registers.store(address, mask, number.slice(size)?)
     })
 }
 
 functions! {
-    (registers: *const mbm_registers)
+    (registers: In<mbm_registers>)
 
     /// Writes one bit of a register; the other bits do not change.
     ///
@@ -80,26 +68,26 @@ functions! {
     /// @param value      the number
     /// @return a status; see mbm_registers
     fn mbm_registers_setUint16(address: u16, order: u8, value: u16)
-        = set(address, order, (&raw const value).cast(), 2);
+        = set(address, order, In::from(&value).cast(), 2);
 
     /// Writes a number into two registers.
     ///
     /// @return as mbm_registers_setUint16
     fn mbm_registers_setUint32(address: u16, order: u8, value: u32)
-        = set(address, order, (&raw const value).cast(), 4);
+        = set(address, order, In::from(&value).cast(), 4);
 
     /// Writes a number into four registers.
     ///
     /// @param value  points to the number
     /// @return as mbm_registers_setUint16
-    fn mbm_registers_setUint64(address: u16, order: u8, value: *const u64)
+    fn mbm_registers_setUint64(address: u16, order: u8, value: In<u64>)
         = set(address, order, value.cast(), 8);
 
     /// Writes a float into two registers, as an IEEE 754 binary32. Its bits are copied.
     ///
     /// @param value  points to the number
     /// @return as mbm_registers_setUint16
-    fn mbm_registers_setFloat(address: u16, order: u8, value: *const f32)
+    fn mbm_registers_setFloat(address: u16, order: u8, value: In<f32>)
         = set(address, order, value.cast(), 4);
 }
 
@@ -109,11 +97,11 @@ functions! {
 /// @param value  points to the number
 /// @return as mbm_registers_setUint16
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setDouble(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_setDouble(
+    registers: In<mbm_registers>,
     address: u16,
     order: u8,
-    value: *const f64,
+    value: In<f64>,
 ) -> u8 {
     #[cfg(not(target_arch = "avr"))]
     {
@@ -122,11 +110,11 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
     // C's double is a float here.
     #[cfg(target_arch = "avr")]
     {
-        match pointers::get(value.cast::<ShortDouble>()) {
+        match value.cast::<ShortDouble>().get() {
             Ok(double) => {
                 let mut bytes = double.to_bytes();
                 bytes.reverse();
-                set(registers, address, order, bytes.as_ptr(), 8)
+                set(registers, address, order, In::from(&bytes).cast(), 8)
             }
             Err(refused) => refused.code(),
         }
@@ -145,16 +133,16 @@ pub unsafe extern "C" fn mbm_registers_setDouble(
 /// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if the text is longer than the
 ///         field
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setString(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_setString(
+    registers: In<mbm_registers>,
     address: u16,
     length: u16,
     order: u8,
-    text: *const c_char,
+    text: In<c_char>,
 ) -> u8 {
     let length = usize::from(length);
     with(registers, order, |registers| {
-        registers.set_text(address, length, pointers::text(text.cast(), length)?)
+        registers.set_text(address, length, text.cast().text(length)?)
     })
 }
 
@@ -170,14 +158,14 @@ pub unsafe extern "C" fn mbm_registers_setString(
 ///                   last register does not change
 /// @return a status; see mbm_registers
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setBytes(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_setBytes(
+    registers: In<mbm_registers>,
     address: u16,
     order: u8,
-    bytes: *const u8,
+    bytes: In<u8>,
     length: u16,
 ) -> u8 {
     with(registers, order, |registers| {
-        registers.set_bytes_in(registers.order, address, slice(bytes, length.into())?)
+        registers.set_bytes_in(registers.order, address, bytes.slice(length.into())?)
     })
 }

@@ -2,7 +2,7 @@
 
 use super::set::with;
 use super::{code, mbm_registers, view};
-use crate::pointers::{self, slice_mut};
+use crate::pointers::{In, Out};
 use core::ffi::c_char;
 use mbm::data::text::{Characters, TextForm};
 use mbm::error::{Error, Status};
@@ -39,13 +39,13 @@ fn form_of(form: u8) -> Result<TextForm, Error> {
 /// @param capacity  size of `text` in bytes; `length + 1` are always enough
 /// @return a status; see mbm_registers. MBM_BUFFER_TOO_SMALL if `text` is
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_getText(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_getText(
+    registers: In<mbm_registers>,
     address: u16,
     length: u16,
     order: u8,
     form: u8,
-    text: *mut c_char,
+    text: Out<c_char>,
     capacity: u16,
 ) -> u8 {
     if text.is_null() {
@@ -53,7 +53,7 @@ pub unsafe extern "C" fn mbm_registers_getText(
     }
     code(view(registers, order, false).and_then(|registers| {
         let form = form_of(form)?;
-        let text = slice_mut::<u8>(text.cast(), capacity.into())?;
+        let text = text.cast::<u8>().slice(capacity.into())?;
         let (end, place) = text.split_last_mut().ok_or(Error::BufferTooSmall)?;
         let order = registers.order;
         let found = registers.text_of(form, order, address, length.into(), place)?;
@@ -70,18 +70,18 @@ pub unsafe extern "C" fn mbm_registers_getText(
 /// @return as mbm_registers_getText; MBM_BUFFER_TOO_SMALL if the text is longer than the field;
 ///         MBM_INVALID_ARGUMENT if it ends with a space, which MBM_TEXT_SPACES would lose
 #[no_mangle]
-pub unsafe extern "C" fn mbm_registers_setText(
-    registers: *const mbm_registers,
+pub extern "C" fn mbm_registers_setText(
+    registers: In<mbm_registers>,
     address: u16,
     length: u16,
     order: u8,
     form: u8,
-    text: *const c_char,
+    text: In<c_char>,
 ) -> u8 {
     let length = usize::from(length);
     with(registers, order, |registers| {
         let form = form_of(form)?;
-        let text = pointers::text(text.cast(), length)?;
+        let text = text.cast().text(length)?;
         registers.set_text_of(form, registers.order, address, length, text)
     })
 }

@@ -4,7 +4,7 @@
 use super::units::{add_only, request};
 use super::{mbm_service, mbm_unit};
 use crate::packet::mbm_object;
-use crate::pointers::slice_or_empty;
+use crate::pointers::In;
 use core::ffi::c_void;
 use mbm::pdu::functions::{
     ENCAPSULATED_INTERFACE_TRANSPORT, READ_EXCEPTION_STATUS, REPORT_SERVER_ID,
@@ -76,8 +76,9 @@ unsafe extern "C" fn serve_server_id(
     info: *const c_void,
 ) -> usize {
     let record = service.cast::<mbm_serverId>();
-    let id = slice_or_empty((*record).id, (*record).idLength.into());
-    let additional = slice_or_empty((*record).additional, (*record).additionalLength.into());
+    let id = In::new((*record).id).slice_or_empty((*record).idLength.into());
+    let additional =
+        In::new((*record).additional).slice_or_empty((*record).additionalLength.into());
     let running = (*record).running != 0;
     let (pdu, length) = request(pdu, info);
     identity::serve_server_id(id, running, additional, pdu, length).code()
@@ -97,7 +98,7 @@ impl Objects for CObjects {
             }
             for _ in 0..(*self.0).count {
                 if (*object).id == id {
-                    return Some(slice_or_empty((*object).data, (*object).length.into()));
+                    return Some(In::new((*object).data).slice_or_empty((*object).length.into()));
                 }
                 object = object.add(1);
             }

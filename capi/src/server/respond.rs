@@ -4,7 +4,7 @@ use super::buffers::Core;
 use super::mbm_unit;
 use super::units;
 use crate::framing::mbm_framing;
-use crate::pointers::get;
+use crate::pointers::In;
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 use core::slice::from_raw_parts_mut;
@@ -54,7 +54,7 @@ pub unsafe extern "C" fn mbm_unit_respond(
     units: *mut mbm_unit,
     count: u8,
     connection: *mut c_void,
-    framing: *const mbm_framing,
+    framing: In<mbm_framing>,
     frame: *mut u8,
     length: u16,
     capacity: u16,
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn mbm_unit_respond(
         // SAFETY: not NULL, so it points to a length.
         unsafe { response.write(0) }
     }
-    let (framing, delimiter) = match get(framing) {
+    let (framing, delimiter) = match framing.get() {
         Ok(fields) => (fields.of_frames(), fields.end()),
         Err(_) => return Status::INVALID_ARGUMENT.code(),
     };

@@ -1,7 +1,7 @@
 //! The events of a sniffer, and events as text.
 
 use crate::packet::{mbm_packet, MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::pointers::{get, slice};
+use crate::pointers::{In, Out};
 use crate::text::{line, outcome};
 use core::ffi::c_char;
 use mbm::error::{Error, Status};
@@ -143,10 +143,9 @@ impl mbm_event {
     }
 
     /// Converts an event of C to one of the core.
-    ///
-    /// # Safety
-    /// `frame` and `pdu` are NULL or point to as many bytes as their lengths say.
-    unsafe fn core_event<'a>(&self) -> Result<Event<'a>, Error> {
+    fn core_event<'a>(&self) -> Result<Event<'a>, Error> {
+        // SAFETY: a sniffer made the event, or C did as its comment says.
+        let (frame, pdu) = unsafe { (In::new(self.frame), In::new(self.pdu)) };
         let head = self.requestHead.get(..self.requestHeadLength.into());
         let asked = head
             .map(RequestStart::new)
@@ -159,8 +158,8 @@ impl mbm_event {
             transaction: self.packet.transaction,
             unit: self.unit,
             function: self.function,
-            frame: slice(self.frame, self.frameLength.into())?,
-            pdu: slice(self.pdu, self.pduLength.into())?,
+            frame: frame.slice(self.frameLength.into())?,
+            pdu: pdu.slice(self.pduLength.into())?,
             length: self.length.into(),
             asked,
         })
@@ -178,14 +177,10 @@ impl mbm_event {
 /// @param size   size of `text` in bytes; 200 are enough for most events, 2400 for all
 /// @return a status; MBM_BUFFER_TOO_SMALL if the line was cut
 #[no_mangle]
-pub unsafe extern "C" fn mbm_event_text(
-    event: *const mbm_event,
-    text: *mut c_char,
-    size: u16,
-) -> u8 {
+pub extern "C" fn mbm_event_text(event: In<mbm_event>, text: Out<c_char>, size: u16) -> u8 {
     let write = || {
         let mut line = line(text, size)?;
-        let event = get(event)?;
+        let event = event.get()?;
         event.core_event()?.text(&mut line);
         Ok(line)
     };

@@ -6,7 +6,7 @@ pub use event::*;
 
 use crate::framing::is_delimiter;
 use crate::functions::{declared, mbm_function};
-use crate::pointers::{self, buffer, c_object, put, read, slice, BEGUN};
+use crate::pointers::{self, c_object, read, In, Out, BEGUN};
 use core::ffi::c_void;
 use mbm::error::{Error, Status};
 use mbm::frame::Framing;
@@ -55,6 +55,14 @@ pub(super) struct Object {
     count: u8,
     functions: [Function; FUNCTIONS],
     core: Sniffer,
+}
+
+impl Object {
+    /// The buffer of received bytes.
+    fn buffer<'a>(&self) -> Result<&'a mut [u8], Error> {
+        // SAFETY: begin demands that it is valid, and only the sniffer uses it.
+        unsafe { Out::new(self.buffer) }.buffer(self.size)
+    }
 }
 
 c_object! { mbm_sniffer, &mut Object }
@@ -125,7 +133,7 @@ pub unsafe extern "C" fn mbm_sniffer_begin(
         functions: [NO_FUNCTION; FUNCTIONS],
         core: Sniffer::new(framing),
     };
-    put(sniffer.cast(), object)
+    Out::new(sniffer).cast().put(object)
 }
 
 /// Declares functions that the standard does not define, in place of those declared
@@ -137,11 +145,11 @@ pub unsafe extern "C" fn mbm_sniffer_begin(
 #[no_mangle]
 pub unsafe extern "C" fn mbm_sniffer_setFunctions(
     sniffer: *mut mbm_sniffer,
-    functions: *const mbm_function,
+    functions: In<mbm_function>,
     count: u8,
 ) -> u8 {
     pointers::with(sniffer, |object| {
-        match slice(functions, count.into()).and_then(convert) {
+        match functions.slice(count.into()).and_then(convert) {
             Ok(functions) => {
                 object.functions = functions;
                 object.count = count;
@@ -229,7 +237,7 @@ pub unsafe extern "C" fn mbm_sniffer_setFrameTimeout(
 pub unsafe extern "C" fn mbm_sniffer_feed(
     sniffer: *mut mbm_sniffer,
     direction: u8,
-    bytes: *const u8,
+    bytes: In<u8>,
     length: u16,
     nowUs: u32,
 ) -> u16 {
@@ -239,15 +247,12 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
         MBM_DIRECTION_SERVER => BusDirection::Server,
         _ => return 0,
     };
-    // Begin demands that the buffer is valid.
-    let Ok(bytes) = slice(bytes, length.into()) else {
+    let Ok(bytes) = bytes.slice(length.into()) else {
         return 0;
     };
-    read(sniffer, 0, |object| {
-        match buffer(object.buffer, object.size) {
-            Ok(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
-            Err(_) => 0,
-        }
+    read(sniffer, 0, |object| match object.buffer() {
+        Ok(buffer) => object.core.feed(buffer, direction, bytes, nowUs) as u16,
+        Err(_) => 0,
     })
 }
 
@@ -266,12 +271,11 @@ pub unsafe extern "C" fn mbm_sniffer_feed(
 pub unsafe extern "C" fn mbm_sniffer_next(
     sniffer: *mut mbm_sniffer,
     nowUs: u32,
-    event: *mut mbm_event,
+    event: Out<mbm_event>,
 ) -> u8 {
     if event.is_null() {
         return 0;
     }
-    // Begin demands that the buffer is valid.
     read(sniffer, 0, |object| {
         if object.core.is_idle(nowUs) {
             return 0;
@@ -283,19 +287,16 @@ pub unsafe extern "C" fn mbm_sniffer_next(
 /// [`mbm_sniffer_next`] for the case that the sniffer has to examine data. A function of
 /// its own, so that a call without an event does not save the registers that this one
 /// needs. (In line, the frame of mbm_sniffer_next is too large for LLVM on an ESP32.)
-///
-/// # Safety
-/// The object was begun with a buffer that is still valid. `event` points to an event.
 #[inline(never)]
-unsafe fn next(object: &mut Object, now: u32, event: *mut mbm_event) -> u8 {
-    let Ok(buffer) = buffer(object.buffer, object.size) else {
+fn next(object: &mut Object, now: u32, event: Out<mbm_event>) -> u8 {
+    let Ok(buffer) = object.buffer() else {
         return 0;
     };
     let functions = object.functions.get(..object.count.into());
     let functions = functions.unwrap_or_default();
     match object.core.next(buffer, functions, now) {
         Some(found) => {
-            put(event, mbm_event::from_event(&found, functions));
+            event.put(mbm_event::from_event(&found, functions));
             1
         }
         None => 0,

@@ -8,9 +8,7 @@ use crate::framing::{is_delimiter, mbm_framing};
 use crate::functions::declared;
 use crate::node::mbm_node;
 use crate::packet::side;
-use crate::pointers::{
-    c_object, change, check, get, object, slice, with_hooks, CObject, BEGUN, IN_HOOK,
-};
+use crate::pointers::{c_object, change, check, object, with_hooks, CObject, In, BEGUN, IN_HOOK};
 use crate::port::{countable, mbm_port, passing_hooks, PortRef};
 use core::ffi::c_void;
 use core::ptr::null;
@@ -146,8 +144,8 @@ unsafe extern "C" fn post_transmission(context: *mut c_void) {
 unsafe fn begin(
     trace: *mut mbm_trace,
     sends: u8,
-    port: *const mbm_port,
-    framing: *const mbm_framing,
+    port: In<mbm_port>,
+    framing: In<mbm_framing>,
     buffer: *mut u8,
     size: u16,
     hook: TraceHook,
@@ -155,7 +153,7 @@ unsafe fn begin(
 ) -> Result<(), Error> {
     let (described, kind) = described(framing)?;
     let sends = side(sends)?;
-    let port = get(port)?;
+    let port = port.get()?;
     // A trace that passes its own bytes on to itself would never end.
     let is_own = port.context == trace.cast();
     if !port.is_complete() || trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
@@ -202,10 +200,9 @@ unsafe fn begin(
 ///
 /// # Safety
 /// `framing` is NULL or points to a description whose declarations are valid.
-unsafe fn described(framing: *const mbm_framing) -> Result<(mbm_framing, Framing), Error> {
-    let described = get(framing)?;
-    let functions = slice(described.functions, described.functionCount.into())?;
-    declared(functions, None)?;
+unsafe fn described(framing: In<mbm_framing>) -> Result<(mbm_framing, Framing), Error> {
+    let described = framing.get()?;
+    declared(described.functions()?, None)?;
     if !is_delimiter(described.end()) {
         return Err(Error::InvalidArgument);
     }
@@ -252,8 +249,8 @@ fn code(result: Result<(), Error>) -> u8 {
 pub unsafe extern "C" fn mbm_trace_begin(
     trace: *mut mbm_trace,
     sends: u8,
-    port: *const mbm_port,
-    framing: *const mbm_framing,
+    port: In<mbm_port>,
+    framing: In<mbm_framing>,
     buffer: *mut u8,
     size: u16,
     hook: Option<unsafe extern "C" fn(context: *mut c_void, record: *const mbm_traceRecord)>,

@@ -2,7 +2,7 @@
 
 use crate::functions::{declared, mbm_function};
 use crate::packet::{MBM_PACKET_REQUEST, MBM_PACKET_RESPONSE};
-use crate::pointers::{get, slice};
+use crate::pointers::{In, Out};
 use crate::sniffer::{mbm_event, MBM_EVENT_BAD_CRC, MBM_EVENT_NOISE, MBM_EVENT_TIMEOUT};
 use core::ffi::c_void;
 use mbm::error::Status;
@@ -79,7 +79,8 @@ impl Observer for CObserver {
 
     fn declaration(&self, code: u8) -> Option<Function> {
         // SAFETY: the begin functions demand that the declarations stay valid.
-        let functions = unsafe { slice(self.functions, self.function_count.into()) }.ok()?;
+        let functions = unsafe { In::new(self.functions) };
+        let functions = functions.slice(self.function_count.into()).ok()?;
         declared(functions, Some(code)).ok().flatten()
     }
 }
@@ -92,17 +93,15 @@ impl Observer for CObserver {
 /// @param record  receives the record; its bytes are valid as long as those of the event
 /// @return a status; MBM_INVALID_ARGUMENT for MBM_EVENT_TIMEOUT, which has no bytes
 #[no_mangle]
-pub unsafe extern "C" fn mbm_trace_ofEvent(
-    event: *const mbm_event,
-    record: *mut mbm_traceRecord,
-) -> u8 {
-    let event = get(event)
+pub extern "C" fn mbm_trace_ofEvent(event: In<mbm_event>, record: Out<mbm_traceRecord>) -> u8 {
+    let event = event
+        .get()
         .ok()
         .filter(|event| event.kind != MBM_EVENT_TIMEOUT);
-    let (Some(event), false) = (event, record.is_null()) else {
+    let Some(event) = event else {
         return Status::INVALID_ARGUMENT.code();
     };
-    let made = mbm_traceRecord {
+    record.put(mbm_traceRecord {
         bytes: event.frame,
         timeUs: event.timeUs,
         length: event.frameLength,
@@ -117,8 +116,5 @@ pub unsafe extern "C" fn mbm_trace_ofEvent(
             MBM_EVENT_NOISE => event.status,
             _ => Status::OK.code(),
         },
-    };
-    // SAFETY: not NULL, so storage of a record.
-    unsafe { record.write(made) };
-    Status::OK.code()
+    })
 }

@@ -177,14 +177,14 @@ impl Sniffer {
             // SAFETY: the sniffer was begun; the memory that an event points to is not used.
             unsafe {
                 if !rest.is_empty() {
-                    let (first, count) = (rest.as_ptr(), rest.len() as u16);
+                    let (first, count) = (In::new(rest.as_ptr()), rest.len() as u16);
                     let direction = MBM_DIRECTION_BOTH;
                     let taken = mbm_sniffer_feed(sniffer, direction, first, count, now);
                     rest = &rest[usize::from(taken)..];
                 }
                 let mut event = zeroed::<mbm_event>();
                 let mut has_found = false;
-                while mbm_sniffer_next(sniffer, now, &mut event) == 1 {
+                while mbm_sniffer_next(sniffer, now, Out::from(&mut event)) == 1 {
                     has_found = true;
                     let age = now.wrapping_sub(event.timeUs);
                     assert!(age < 600_000_000, "an event {age} us ago");

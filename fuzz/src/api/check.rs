@@ -2,6 +2,7 @@
 
 use super::world::World;
 use mbm_c::MBM_MALFORMED_VALUE;
+use mbm_c::{In, Out};
 
 pub const OK: u8 = 0;
 pub const PENDING: u8 = 235;
@@ -34,7 +35,7 @@ macro_rules! call {
         $w.before($object);
         // SAFETY: every pointer is NULL or valid as the header requires.
         #[allow(unused_unsafe)]
-        let returned = unsafe { mbm_c::$name($($ready),*) };
+        let returned = unsafe { mbm_c::$name($($crate::api::check::Pass::pass($ready)),*) };
         $w.after();
         $w.note(|| format!("-> {returned:?}"));
         returned
@@ -67,6 +68,40 @@ macro_rules! refused {
             call!($w, $name($($argument),*))
         })
     };
+}
+
+/// An argument that a C function takes as a `T`: a pointer as the type of its parameter.
+pub trait Pass<T> {
+    /// The argument.
+    ///
+    /// # Safety
+    /// A pointer is NULL or valid as the header requires.
+    unsafe fn pass(self) -> T;
+}
+
+/// Passes arguments of one type as another.
+macro_rules! passes {
+    ($($given:ty => $taken:ty: $argument:ident => $passed:expr;)*) => {
+        $(impl<T> Pass<$taken> for $given {
+            unsafe fn pass(self) -> $taken {
+                let $argument = self;
+                $passed
+            }
+        })*
+    };
+}
+
+passes! {
+    T => T: value => value;
+    *mut T => *const T: pointer => pointer;
+    &mut T => *mut T: value => value;
+    &T => *const T: value => value;
+    *const T => In<T>: pointer => In::new(pointer);
+    *mut T => In<T>: pointer => In::new(pointer);
+    &T => In<T>: value => In::from(value);
+    &mut T => In<T>: value => In::from(&*value);
+    *mut T => Out<T>: pointer => Out::new(pointer);
+    &mut T => Out<T>: value => Out::from(value);
 }
 
 /// A memory range: its start and its length in bytes.

@@ -31,11 +31,12 @@ pub fn reply_of(w: &World, request: *mut mbm_clientRequest) {
         bytes(data);
         let (record, object) = (w.zeroed::<mbm_record>(), w.zeroed::<mbm_object>());
         let cursor: *mut u16 = w.zeroed();
-        while mbm_packet_nextRecord(packet, cursor, record) != 0 {
+        let (found, next) = (In::new(packet), || Out::new(cursor));
+        while mbm_packet_nextRecord(found, next(), Out::new(record)) != 0 {
             bytes(((*record).data, 2 * usize::from((*record).length)));
         }
         cursor.write(0);
-        while mbm_packet_nextObject(packet, cursor, object) != 0 {
+        while mbm_packet_nextObject(found, next(), Out::new(object)) != 0 {
             bytes(((*object).data, (*object).length.into()));
         }
     }

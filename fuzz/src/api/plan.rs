@@ -9,7 +9,7 @@ use std::ptr::null_mut;
 unsafe extern "C" fn update(_: *mut c_void, plan: *mut mbm_plan, field: u16) {
     let w = World::current();
     // SAFETY: the plan passes itself.
-    let status = unsafe { mbm_plan_getStatus(plan, field, null_mut()) };
+    let status = unsafe { mbm_plan_getStatus(plan, field, Out::new(null_mut())) };
     is_status("mbm_plan_getStatus", status);
     w.hook(Grant::All, 6);
 }

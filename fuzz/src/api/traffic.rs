@@ -140,12 +140,12 @@ fn respond(w: &World, framing: u8, frame: &[u8]) -> Vec<u8> {
                 w.device.get(),
                 1,
                 std::ptr::null_mut(),
-                &mbm_framing {
+                In::from(&mbm_framing {
                     functions: std::ptr::null(),
                     functionCount: 0,
                     kind: framing,
                     delimiter: 0,
-                },
+                }),
                 buffer.as_mut_ptr(),
                 frame.len() as u16,
                 buffer.len() as u16,

@@ -462,7 +462,7 @@ impl Records {
                 &raw mut *self.unit,
                 1,
                 std::ptr::null_mut(),
-                &raw const framing,
+                In::from(&framing),
                 frame.as_mut_ptr(),
                 request.len() as u16,
                 256,
