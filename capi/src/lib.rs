@@ -1,8 +1,8 @@
 //! The C ABI of mbm, and its only unsafe code.
 //!
 //! Rules of every function here:
-//! - A pointer is NULL, or points to an object of the kind that the function's comment names.
-//!   For NULL, and for an object that was never begun, the function returns a status.
+//! - A pointer is NULL, or points to what the function's comment names, which nothing else uses
+//!   meanwhile. For NULL, and for an object that was never begun, the function returns a status.
 //! - Objects are the caller's storage, zeroed before first use.
 //! - Arguments and results are integers and pointers only: no enum, no bool, no float by
 //!   value.
@@ -19,9 +19,14 @@
     clippy::undocumented_unsafe_blocks
 )]
 #![allow(non_camel_case_types, non_snake_case)]
-// The safety rules are the same for every exported function: see the rules above. The body of an
-// unsafe function relies on what its comment demands of the caller. A block with a SAFETY line
-// stands where more is to be shown, and in every function that is safe.
+// What every unsafe function demands of its arguments; `# Safety` stands where one demands more:
+// - A pointer to a type of the header is one of C, as the rules above say. The type `In` or `Out` says
+//   so of a value, and gives it without unsafe code.
+// - An `Object` is begun. Neither a reference into it nor one into the object that it uses, its client
+//   or line, lives, so that hooks may run.
+// - An argument with the name and type of one of an earlier function of the file is as that demands.
+// The body of an unsafe function relies on these rules. A block with a SAFETY line stands where more is
+// to be shown, and in every function that is safe.
 #![allow(clippy::missing_safety_doc)]
 
 #[cfg(feature = "capi")]

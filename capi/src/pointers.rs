@@ -311,9 +311,6 @@ pub(crate) unsafe fn check<O: CObject>(object: *const O) -> Status {
 /// As [`check`], inlined: for a function that is, in most images, the only one of its
 /// object's type that checks. With `check` for all, a server takes 12 bytes more on a Cortex-M0+,
 /// and a master 16.
-///
-/// # Safety
-/// As for [`check`].
 pub(crate) unsafe fn check_once<O: CObject>(object: *const O) -> Status {
     if object.is_null() {
         return Status::INVALID_ARGUMENT;
@@ -379,9 +376,6 @@ pub(crate) unsafe fn zero<O: CObject>(object: *mut O) {
 /// As [`zero`] on a host, where a begin function tolerates storage that was not zeroed. It does
 /// nothing in firmware, where a line would take 20 bytes of flash more, and a node and a server
 /// as much.
-///
-/// # Safety
-/// As for [`zero`].
 #[inline(always)]
 pub(crate) unsafe fn zero_on_host<O: CObject>(object: *mut O) {
     if !cfg!(target_os = "none") {
@@ -393,7 +387,7 @@ pub(crate) unsafe fn zero_on_host<O: CObject>(object: *mut O) {
 /// or of `action`. `action` calls hooks only inside [`with_hooks`].
 ///
 /// # Safety
-/// As for [`check`]; nothing else uses the object meanwhile.
+/// Nothing else uses the object meanwhile.
 pub(crate) unsafe fn with<'a, O: CObject>(
     object: *mut O,
     action: impl FnOnce(O::Access<'a>) -> Status,
@@ -406,9 +400,6 @@ pub(crate) unsafe fn with<'a, O: CObject>(
 }
 
 /// As [`with`], for an action that nothing refuses.
-///
-/// # Safety
-/// As for [`with`].
 pub(crate) unsafe fn change<'a, O: CObject>(
     object: *mut O,
     action: impl FnOnce(O::Access<'a>),
@@ -421,9 +412,6 @@ pub(crate) unsafe fn change<'a, O: CObject>(
 
 /// Checks the object and returns what `getter` reads of it. Returns `otherwise` if the
 /// check refuses.
-///
-/// # Safety
-/// As for [`with`].
 pub(crate) unsafe fn read<'a, O: CObject, T>(
     object: *const O,
     otherwise: T,

@@ -30,9 +30,6 @@ const _: () = {
 };
 
 /// The ring at a pointer from C, if it was begun.
-///
-/// # Safety
-/// `ring` is NULL or points to an `mbm_ring`, zeroed or begun.
 unsafe fn ring<'a>(ring: *const mbm_ring) -> Option<Ring<'a>> {
     if ring.is_null() {
         return None;

@@ -13,9 +13,6 @@ use mbm::error::Status;
 
 /// Begins a client of one kind of transport. A client that was begun before first gives up
 /// its requests.
-///
-/// # Safety
-/// As the header demands of the begin functions.
 unsafe fn begin(
     pointer: *mut mbm_client,
     port: *const mbm_port,
@@ -52,9 +49,6 @@ unsafe fn begin(
 /// If the storage is a client, gives up its requests and zeroes the storage. Returns
 /// [`Status::NOT_INITIALISED`] if the storage is zeroed now, otherwise the status that says
 /// why the client cannot be begun.
-///
-/// # Safety
-/// As for [`pointers::check`].
 unsafe fn give_up(client: *mut mbm_client) -> Status {
     // While `release` calls hooks, the mark refuses their calls on the object, and no reference
     // into it lives. Zero is a valid value of every field except `kind`, which is set before it

@@ -144,7 +144,7 @@ unsafe fn accept(identification: *mut mbm_identification, length: u8) -> Result<
 /// status than `status`.
 ///
 /// # Safety
-/// As for [`accept`]. No reference to the identification lives.
+/// No reference to the identification lives.
 unsafe fn hand_out(identification: *mut mbm_identification, length: u8, status: u8) {
     // No reference to the reply lives during a call of `object`, which may overwrite it: each
     // object is read anew.

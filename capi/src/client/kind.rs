@@ -63,8 +63,8 @@ pub(super) static TOLERANT: TransportKind = TransportKind {
 };
 const _: () = assert!(offset_of!(TolerantTransport, tcp) == 0);
 
-/// # Safety
-/// As for [`transport`].
+// All functions demand that the transport of `object` has the type that they name.
+
 unsafe fn advance<T: Transport<RequestPtr>>(
     object: *mut Object,
     now: u32,
@@ -74,14 +74,10 @@ unsafe fn advance<T: Transport<RequestPtr>>(
     transport::<T>(object).advance(&mut (*object).queue, now, fresh)
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn release<T: Transport<RequestPtr>>(object: *mut Object, request: Option<&RequestPtr>) {
     transport::<T>(object).release(request)
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn release_stream(object: *mut Object, request: Option<&RequestPtr>) {
     release::<SerialTransport>(object, request);
     if request.is_none() {
@@ -90,30 +86,22 @@ unsafe fn release_stream(object: *mut Object, request: Option<&RequestPtr>) {
     }
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn start_rtu(object: *mut Object) {
     (*object).queue.has_broadcast = true;
     transport::<SerialTransport>(object).engine.line_used();
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn start_stream(object: *mut Object) {
     let transport = transport::<SerialTransport>(object);
     transport.set_stream();
     transport.engine.line_used();
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn start_ascii(object: *mut Object) {
     start_rtu(object);
     transport::<SerialTransport>(object).set_ascii();
 }
 
-/// # Safety
-/// As for [`transport`].
 unsafe fn start_tcp(object: *mut Object) {
     (*object).queue.has_transaction_ids = true;
 }

@@ -104,22 +104,17 @@ pub(crate) struct LinkedKind {
     pub(crate) transport: *const TransportKind,
 }
 
+// The functions demand that `object` is of this kind.
 impl TransportKind {
-    /// # Safety
-    /// As for [`transport`], of this kind.
     pub(crate) unsafe fn port(&self, object: *mut Object) -> *mut mbm_port {
         object.byte_add(self.port.into()).cast()
     }
 
-    /// # Safety
-    /// As for [`transport`], of this kind.
     pub(crate) unsafe fn settings<'a>(&self, object: *mut Object) -> &'a mut Settings {
         // The offset is that of the settings.
         &mut *object.byte_add(self.settings.into()).cast()
     }
 
-    /// # Safety
-    /// As for [`transport`], of this kind.
     pub(crate) unsafe fn storage<'a>(&self, object: *mut Object) -> &'a mut ClientBuffers {
         // The offset is that of the storage.
         &mut *object.byte_add(self.storage.into()).cast()

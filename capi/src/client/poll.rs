@@ -11,9 +11,6 @@ use mbm::engine::LateUnits;
 use mbm::error::Status;
 
 /// The time on the clock of a client's port.
-///
-/// # Safety
-/// `object` is begun; no reference into it lives, as the clock is a hook.
 unsafe fn now(object: *mut Object) -> u32 {
     port::now((*(*object).kind).port(object))
 }
@@ -28,9 +25,6 @@ pub(crate) unsafe fn clock(client: *mut mbm_client) -> u32 {
 
 /// Microseconds for which the line of a client leaves a unit alone, because it may still answer a
 /// request that was cancelled; 0 if the object is no client.
-///
-/// # Safety
-/// `client` is NULL or storage of a client, zeroed or begun.
 pub(crate) unsafe fn rest(client: *mut mbm_client, unit: u8) -> u32 {
     // No reference lives while the clock is read.
     if pointers::check(client) != Status::OK {

@@ -29,12 +29,9 @@ impl Arguments {
 
 /// The further steps of a function after [`RequestState::set_all`]. It receives the status
 /// of that function, and returns the status of the request.
-type More = unsafe fn(&mut RequestFields, &[usize; 4], Status) -> Status;
+type More = fn(&mut RequestFields, &[usize; 4], Status) -> Status;
 
 /// Checks whether the request may be queued.
-///
-/// # Safety
-/// As the header demands.
 unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) -> Status {
     match pointers::check(client) {
         Status::OK if request.is_null() => Status::INVALID_ARGUMENT,
@@ -54,7 +51,7 @@ unsafe fn prepare(client: *const mbm_client, request: *mut mbm_clientRequest) ->
 /// Builds a request and queues it; or returns the status that says why it is refused.
 ///
 /// # Safety
-/// As the header demands; [`prepare`] returned [`Status::OK`] for the request.
+/// [`prepare`] returned [`Status::OK`] for the request.
 unsafe fn submit(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -87,9 +84,6 @@ unsafe fn submit(
 
 /// Queues a request. (The calling convention of C extends the status to a word, as the calling
 /// function must return it: that saves 40 bytes on a Cortex-M0+.)
-///
-/// # Safety
-/// As the header demands.
 #[allow(improper_ctypes_definitions)] // C does not call it.
 unsafe extern "C" fn queue_request(
     client: *mut mbm_client,
@@ -106,9 +100,6 @@ unsafe extern "C" fn queue_request(
 }
 
 /// Queues a request that has at most two words.
-///
-/// # Safety
-/// As the header demands.
 unsafe extern "C" fn two_words(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -121,9 +112,6 @@ unsafe extern "C" fn two_words(
 }
 
 /// Queues a read of a table of the data model, by the number of its function, 01 to 04.
-///
-/// # Safety
-/// As the header demands of mbm_client_readCoils.
 pub(crate) unsafe fn read_table(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -136,9 +124,6 @@ pub(crate) unsafe fn read_table(
 }
 
 /// Queues a request that consists of its function code only.
-///
-/// # Safety
-/// As the header demands.
 unsafe extern "C" fn code_only(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -148,9 +133,6 @@ unsafe extern "C" fn code_only(
 }
 
 /// Queues a request that needs up to four words, or further steps.
-///
-/// # Safety
-/// As the header demands.
 #[inline(always)]
 unsafe fn with_more(
     client: *mut mbm_client,
@@ -163,10 +145,7 @@ unsafe fn with_more(
 }
 
 /// Adds the registers that the request writes.
-///
-/// # Safety
-/// Always safe. It is unsafe only to have the type [`More`].
-unsafe fn add_write(fields: &mut RequestFields, words: &[usize; 4], readable: Status) -> Status {
+fn add_write(fields: &mut RequestFields, words: &[usize; 4], readable: Status) -> Status {
     let state = &mut fields.state;
     match state.add_write(words[2] as u16, words[3] as u16) {
         Status::OK => readable,
@@ -489,9 +468,6 @@ pub unsafe extern "C" fn mbm_client_forward(
 }
 
 /// As [`mbm_client_forward`]. Records without a byte count are refused unless they `MAY_LACK_COUNT`.
-///
-/// # Safety
-/// As for [`mbm_client_forward`].
 pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
     client: *mut mbm_client,
     request: *mut mbm_clientRequest,
@@ -517,7 +493,8 @@ pub unsafe fn forward<const MAY_LACK_COUNT: bool>(
             let bytes = match words[1] {
                 0 => &[],
                 _ if body.is_null() => return Status::INVALID_ARGUMENT,
-                count => from_raw_parts(body, count),
+                // SAFETY: `body` has `bytes` bytes.
+                count => unsafe { from_raw_parts(body, count) },
             };
             let function = words[0] as u8;
             let status = if MAY_LACK_COUNT {
@@ -545,19 +522,13 @@ fn identification(code: u8, object: u8) -> [usize; 4] {
 }
 
 /// Adds the words that the request sends.
-///
-/// # Safety
-/// As for [`add_group`].
-unsafe fn add_words(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
+fn add_words(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
     let state = &mut fields.state;
     state.add_words(words[0] as u16, words[1] as u16)
 }
 
 /// Adds the group of file records that the request reads or writes.
-///
-/// # Safety
-/// Always safe. It is unsafe only to have the type [`More`].
-unsafe fn add_group(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
+fn add_group(fields: &mut RequestFields, words: &[usize; 4], _: Status) -> Status {
     let [_, file, record, quantity] = *words;
     let state = &mut fields.state;
     state.add_group(file as u16, record as u16, quantity as u16)

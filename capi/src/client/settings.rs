@@ -19,9 +19,6 @@ pub(super) struct Parts<'a> {
 }
 
 /// Changes a setting.
-///
-/// # Safety
-/// As for [`pointers::with`].
 pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> Status) -> u8 {
     pointers::with(client, |object| {
         let kind = &*(*object).kind;
@@ -35,9 +32,6 @@ pub(super) unsafe fn set(client: *mut mbm_client, change: impl FnOnce(Parts) -> 
 
 /// Changes a setting that has no effect on TCP, and whose code only those programs contain that
 /// set it.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings)) -> u8 {
     pointers::change(client, |object| {
         let kind = &*(*object).kind;

@@ -24,7 +24,7 @@ const _: () = {
 /// `change` returns false if it refuses, with nothing changed.
 ///
 /// # Safety
-/// As for [`transport`]; the client has TCP frames.
+/// The client has TCP frames.
 unsafe fn set_tolerant(
     object: *mut Object,
     change: impl FnOnce(&mut TolerantTransport) -> bool,

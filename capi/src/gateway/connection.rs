@@ -7,9 +7,6 @@ use crate::port::mbm_port;
 use mbm::error::Status;
 
 /// Runs `action` on a gateway that has this place for a connection.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn with_place(
     gateway: *mut mbm_gateway,
     connection: u8,
@@ -24,9 +21,6 @@ unsafe fn with_place(
 }
 
 /// Reads something of a place for a connection; `otherwise` if the gateway has no such place.
-///
-/// # Safety
-/// As for [`pointers::read`].
 unsafe fn read_place<T>(
     gateway: *const mbm_gateway,
     connection: u8,

@@ -103,9 +103,6 @@ fn copy(to: &mut mbm_gatewayConfig, from: &mbm_gatewayConfig) {
 }
 
 /// [`Status::OK`] if a gateway can consist of these parts.
-///
-/// # Safety
-/// Each pointer is NULL, or points to as many items as its count says.
 unsafe fn check(config: &mbm_gatewayConfig) -> Status {
     if config.routes.is_null()
         || config.connections.is_null()
@@ -127,9 +124,6 @@ unsafe fn check(config: &mbm_gatewayConfig) -> Status {
 }
 
 /// Gives up the connections of a gateway that was begun before.
-///
-/// # Safety
-/// `gateway` is NULL, or storage of a gateway, zeroed or begun.
 unsafe fn give_up(gateway: *mut mbm_gateway) -> Status {
     match pointers::check(gateway) {
         Status::OK => {}

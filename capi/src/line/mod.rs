@@ -27,9 +27,6 @@ c_object! { mbm_line, &mut Core, core }
 /// Whether the port and the buffers of the line may be changed: [`Status::OK`];
 /// [`Status::BUSY`] while a request is pending; [`Status::INVALID_ARGUMENT`] for NULL. Makes
 /// zeroed storage a line with default settings, without port and frame buffer.
-///
-/// # Safety
-/// As for [`pointers::with`].
 pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
     // Storage that was not begun is zeroed, and zero is a valid value of every field.
     match pointers::check_once(line) {
@@ -44,9 +41,6 @@ pub(crate) unsafe fn prepare(line: *mut mbm_line) -> Status {
 }
 
 /// Runs `action`, which may call hooks, on the core of a line.
-///
-/// # Safety
-/// As for [`pointers::with_hooks`].
 pub(crate) unsafe fn with_hooks<T>(line: *mut mbm_line, action: impl FnOnce(&mut Core) -> T) -> T {
     // SAFETY: begun, so every field is valid; exclusive, because the mark keeps every other
     // function from making a reference.

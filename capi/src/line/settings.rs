@@ -115,9 +115,6 @@ functions! {
 }
 
 /// Notes a use of the line, which asks the clock of its port.
-///
-/// # Safety
-/// As for [`crate::pointers::with`].
 unsafe fn note_use(line: *mut mbm_line, note: impl FnOnce(&mut Core)) -> u8 {
     let status = check(line);
     if status == Status::OK {

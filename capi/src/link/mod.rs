@@ -95,7 +95,7 @@ pub unsafe extern "C" fn mbm_link_begin(
 /// As [`mbm_link_begin`].
 ///
 /// # Safety
-/// As for [`mbm_link_begin`]; `link` is not NULL.
+/// `link` is not NULL.
 unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHooks) -> Status {
     let status = pointers::check(client);
     if status != Status::OK {
@@ -145,17 +145,11 @@ unsafe fn begin(link: *mut mbm_link, client: *mut mbm_client, hooks: &mbm_linkHo
 }
 
 /// True if the link is that of the client. It is not if the client was begun again since.
-///
-/// # Safety
-/// `link` and `client` are storage of such objects.
 unsafe fn is_of(link: *const Object, client: *const client::Object) -> bool {
     (*client).linked && (*client).kind.cast::<Object>() == link
 }
 
 /// Restores the client as it was before the link began.
-///
-/// # Safety
-/// `link` is begun, and its client's storage is valid.
 unsafe fn end(link: *mut Object) -> Status {
     let client = (*link).kind.client;
     if client.is_null() {

@@ -135,9 +135,6 @@ unsafe fn close(link: *mut Object) {
 }
 
 /// Counts one event, if there are counters.
-///
-/// # Safety
-/// `link` is begun.
 unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u32) {
     // The counters are valid as mbm_link_setCounters demands.
     if let Some(counters) = (*link).counters.as_mut() {
@@ -147,9 +144,6 @@ unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u3
 }
 
 /// Advances link and client.
-///
-/// # Safety
-/// As for [`client::Advance`].
 pub(super) unsafe fn advance(
     object: *mut client::Object,
     now: u32,
@@ -168,7 +162,7 @@ pub(super) unsafe fn advance(
 /// As [`advance`].
 ///
 /// # Safety
-/// As for [`advance`]; `link` is the client's.
+/// `link` is the client's.
 unsafe fn advance_linked(
     link: *mut Object,
     object: *mut client::Object,
@@ -222,9 +216,6 @@ unsafe fn advance_linked(
 }
 
 /// Advances the client's requests. An idle client reads and drops what arrives.
-///
-/// # Safety
-/// As for [`advance_linked`].
 unsafe fn advance_transport(
     link: *mut Object,
     object: *mut client::Object,
@@ -266,9 +257,6 @@ unsafe fn advance_transport(
 
 /// Reads all bytes that have arrived, also if they are more than the client's buffer holds.
 /// Returns a request that has ended.
-///
-/// # Safety
-/// As for [`advance_linked`].
 unsafe fn read_all(link: *mut Object, object: *mut client::Object, now: u32) -> Option<RequestPtr> {
     const MOST_READS: u8 = 16;
     for _ in 0..MOST_READS {
@@ -281,9 +269,6 @@ unsafe fn read_all(link: *mut Object, object: *mut client::Object, now: u32) -> 
 }
 
 /// Advances the client's transport, and notes whether bytes have arrived.
-///
-/// # Safety
-/// As for [`advance_linked`].
 pub(super) unsafe fn advance_noting(
     link: *mut Object,
     object: *mut client::Object,
@@ -299,9 +284,6 @@ pub(super) unsafe fn advance_noting(
 }
 
 /// Closes the link if the device has fallen silent.
-///
-/// # Safety
-/// As for [`advance_linked`].
 unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u32) {
     let queue = client::queue(object);
     let timeout = (*(*link).kind.transport)
@@ -317,7 +299,7 @@ unsafe fn close_if_silent(link: *mut Object, object: *mut client::Object, now: u
 /// Notes that a request in flight was cancelled, and discards its state.
 ///
 /// # Safety
-/// As for [`TransportKind::release`]; `object` has a link.
+/// `object` has a link.
 pub(super) unsafe fn release(object: *mut client::Object, request: Option<&RequestPtr>) {
     let link = (*object).kind.cast::<Object>().cast_mut();
     if request.is_some() {
@@ -328,9 +310,6 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
 
 /// Counts an event. Returns the request whose `done` reports the event, if the program wants
 /// to know it.
-///
-/// # Safety
-/// As for [`advance_linked`].
 unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
     count(
         link,
@@ -359,9 +338,6 @@ pub(super) unsafe extern "C" fn report(context: *mut c_void, _: *mut mbm_clientR
 }
 
 /// Microseconds until the next poll of the client is due; `delay` is that of its transport.
-///
-/// # Safety
-/// As for [`advance`]; `object` has a link.
 pub(super) unsafe fn delay(object: *mut client::Object, now: u32, delay: u32) -> u32 {
     let link = (*object).kind.cast::<Object>();
     let queue = client::queue(object);

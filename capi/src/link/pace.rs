@@ -63,9 +63,6 @@ pub unsafe extern "C" fn mbm_link_setDelayAfterConnect(link: *mut mbm_link, dela
 }
 
 /// Advances link and client, and closes the link or lets it rest as the settings say.
-///
-/// # Safety
-/// As for [`client::Advance`].
 unsafe fn advance(object: *mut client::Object, now: u32, fresh: bool) -> Option<RequestPtr> {
     if !(*object).linked {
         return advance_link(object, now, fresh);
@@ -98,9 +95,6 @@ unsafe fn advance(object: *mut client::Object, now: u32, fresh: bool) -> Option<
 }
 
 /// Notes whether the delay after connecting is over.
-///
-/// # Safety
-/// `link` is begun.
 unsafe fn note_age(link: *mut Object, now: u32) {
     let core = &(*link).core;
     if core.state() != LinkState::Up {
@@ -115,7 +109,7 @@ unsafe fn note_age(link: *mut Object, now: u32) {
 /// noticed.
 ///
 /// # Safety
-/// As for [`advance`]; `link` is the client's.
+/// `link` is the client's.
 unsafe fn hold(
     link: *mut Object,
     object: *mut client::Object,

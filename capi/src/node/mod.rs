@@ -92,9 +92,6 @@ pub unsafe extern "C" fn mbm_node_begin(
 
 /// Whether a hook of the line's port makes the call: [`Status::BUSY`], otherwise [`Status::OK`];
 /// [`Status::NOT_INITIALISED`] if the line was zeroed.
-///
-/// # Safety
-/// The node was begun, so it has a line.
 unsafe fn check_line(object: *mut Object) -> Status {
     pointers::check_mark((*object).line)
 }
@@ -121,9 +118,6 @@ pub unsafe extern "C" fn mbm_node_poll(node: *mut mbm_node) -> u8 {
 }
 
 /// As [`mbm_node_poll`].
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe extern "C" fn poll(node: *mut mbm_node) -> u8 {
     // No reference to the node lives while hooks run; the line's mark keeps them from the line.
     match pointers::check(node) {
@@ -218,9 +212,6 @@ pub unsafe extern "C" fn mbm_node_getExceptionCode(node: *const mbm_node) -> u8 
 
 /// Starts a request that has an address and a word and, in blocking mode, polls until it has
 /// ended.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, function: u8) -> u8 {
     request(pointer, |node, line| {
         node.request(line, address, word, function)
@@ -228,9 +219,6 @@ unsafe fn call(pointer: *mut mbm_node, address: u16, word: u16, function: u8) ->
 }
 
 /// Starts a request and, in blocking mode, polls until it has ended.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn request(
     pointer: *mut mbm_node,
     start: impl FnOnce(&mut Node, &mut line::Core) -> Status,
@@ -246,9 +234,6 @@ unsafe fn request(
 
 /// Gives the line the words and the timeout of the node, if the node may make a request:
 /// [`Status::OK`]; otherwise the reason.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn take_line(node: *mut mbm_node) -> Status {
     let mut status = pointers::check(node);
     let object = node.cast::<Object>();
@@ -280,7 +265,7 @@ unsafe fn take_line(node: *mut mbm_node) -> Status {
 /// there is nothing to do.
 ///
 /// # Safety
-/// As for [`pointers::with`]; `status` is the one that the last call on that node returned.
+/// `status` is the one that the last call on that node returned.
 unsafe fn finish(pointer: *mut mbm_node, mut status: u8) -> u8 {
     if status != Status::PENDING.code() {
         return status;

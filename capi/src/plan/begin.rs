@@ -98,9 +98,6 @@ pub unsafe extern "C" fn mbm_plan_beginGrouped(
 }
 
 /// Begins a plan with the reads that `group` makes. It is refused if `is_usable` is false.
-///
-/// # Safety
-/// As the header demands of mbm_plan_begin.
 unsafe fn begin(
     plan: *mut mbm_plan,
     client: *mut mbm_client,
@@ -117,9 +114,6 @@ unsafe fn begin(
 }
 
 /// As [`begin`]; writes the index of the field that is wrong, if it is one.
-///
-/// # Safety
-/// As [`begin`] demands.
 #[inline(always)]
 unsafe fn attempt(
     plan: *mut mbm_plan,

@@ -68,9 +68,6 @@ fn conversion<'a>(from: In<mbm_planConversion>) -> Result<(Conversion<'a>, Optio
 }
 
 /// The power of ten that a field of a plan holds for another one.
-///
-/// # Safety
-/// As the header demands.
 unsafe fn power_of(plan: *const mbm_plan, field: u16, of: u16) -> Result<i8, Error> {
     let (mut own, mut other) = (MaybeUninit::uninit(), MaybeUninit::uninit());
     find(plan, field, &mut own).result()?;
@@ -88,9 +85,6 @@ unsafe fn power_of(plan: *const mbm_plan, field: u16, of: u16) -> Result<i8, Err
 }
 
 /// Finds a value of a plan and puts it where C wants it.
-///
-/// # Safety
-/// As the header demands; `place` is NULL or points to a `T`.
 unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,

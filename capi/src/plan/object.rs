@@ -52,9 +52,6 @@ impl Object {
 
 /// Brings the plan's time up to date and returns it, in milliseconds; as it was if the client
 /// may not be used now.
-///
-/// # Safety
-/// `object` is begun, and no reference into it or its client lives.
 pub(super) unsafe fn time(object: *mut Object) -> u32 {
     let client = (*object).client;
     if pointers::check(client) == Status::OK {

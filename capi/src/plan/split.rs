@@ -119,9 +119,6 @@ unsafe fn poll_splitting(
 }
 
 /// Begins with a plan that was begun since the last call.
-///
-/// # Safety
-/// `object` is begun; `splitting` is as the header demands.
 unsafe fn start(object: *mut Object, splitting: *mut mbm_planSplitting) {
     if (*splitting).state & STARTED != 0 && (*splitting).begins == (*object).begins {
         return;
@@ -133,9 +130,6 @@ unsafe fn start(object: *mut Object, splitting: *mut mbm_planSplitting) {
 }
 
 /// Calls `act` with the parts of the plan, and notes how many reads there are after that.
-///
-/// # Safety
-/// `object` is begun, and no reference to its reads, positions or data lives.
 unsafe fn change<T>(
     object: *mut Object,
     splitting: *mut mbm_planSplitting,
@@ -161,9 +155,6 @@ unsafe fn change<T>(
 }
 
 /// The time after which something that failed is tried again.
-///
-/// # Safety
-/// `splitting` is as the header demands.
 unsafe fn retry_ms(splitting: *const mbm_planSplitting) -> u32 {
     match (*splitting).retryMs {
         0 => RETRY_MS,
@@ -199,9 +190,6 @@ unsafe fn end(
 }
 
 /// Joins reads as far as they can be.
-///
-/// # Safety
-/// As for [`end`].
 unsafe fn settle(object: *mut Object, splitting: *mut mbm_planSplitting) {
     let now = (*object).millis;
     if now.wrapping_sub((*splitting).triedAt) >= retry_ms(splitting) {

@@ -38,9 +38,6 @@ pub(super) struct Found<'a> {
 }
 
 /// Finds a field. Returns [`Status::OK`] with `found` set, or says why not.
-///
-/// # Safety
-/// `plan` is NULL or storage of a plan.
 #[inline(always)]
 pub(super) unsafe fn find(
     plan: *const mbm_plan,
@@ -71,7 +68,7 @@ pub(super) unsafe fn find(
 /// field.
 ///
 /// # Safety
-/// As for [`find`]; nothing changes the data while `words` lives.
+/// Nothing changes the data while `words` lives.
 pub(super) unsafe fn find_words(
     plan: *const mbm_plan,
     field: u16,
@@ -107,9 +104,6 @@ pub(super) unsafe fn find_words(
 
 /// Finds something in the words of a field and puts it where C wants it. Without a value it is
 /// refused with the status of the field.
-///
-/// # Safety
-/// As the header demands; `place` is NULL or points to a `T`.
 unsafe fn get<T>(
     plan: *const mbm_plan,
     field: u16,

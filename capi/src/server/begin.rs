@@ -13,9 +13,6 @@ const MIN_FRAME: u16 = 16;
 
 /// Begins a server: checks the port, the units and the buffer, then stores all of them.
 /// `framing` sets the framing.
-///
-/// # Safety
-/// Each argument is as the header requires.
 unsafe fn begin(
     server: *mut mbm_server,
     port: *const mbm_port,

@@ -120,10 +120,6 @@ impl DataModel for Callbacks {
 }
 
 /// Serves a request to the cells.
-///
-/// # Safety
-/// `service` is the head of a `mbm_dataCallbacks`; `pdu` has the length and the space that
-/// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     let record = service.cast::<mbm_dataCallbacks>();
     let kind = TableKind::from_code((*record).service.kind);

@@ -33,9 +33,6 @@ pub struct mbm_functionMask {
     pub off: [u8; 16],
 }
 
-/// # Safety
-/// `service` is the head of a `mbm_custom`; `pdu` has the length and the space that `info`
-/// gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     let code = (*service.cast::<mbm_custom>()).code;
     if code != *pdu && (code != 0 || (*refusal_of(info)).is_of_cells()) {
@@ -46,9 +43,6 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 
 /// Calls the handler of the record. A function of its own, so that a request for another
 /// function stays cheap.
-///
-/// # Safety
-/// As for [`serve`].
 unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_void) -> usize {
     // No reference to the record is kept while its function runs.
     let to = (*info.cast::<Indication>()).to;
@@ -85,9 +79,6 @@ unsafe fn call_handler(record: *mut mbm_custom, pdu: *mut u8, info: *const c_voi
 }
 
 /// The length rule of `function`, if this is the head of the record for that function.
-///
-/// # Safety
-/// `service` is the head of a record of any kind.
 unsafe fn rule_of(service: *const mbm_service, function: u8) -> Option<Rule> {
     // A record of that kind is a `mbm_custom`.
     if !is_custom(service) {
@@ -101,9 +92,6 @@ unsafe fn rule_of(service: *const mbm_service, function: u8) -> Option<Rule> {
 }
 
 /// The length rule that the units have for a user's function.
-///
-/// # Safety
-/// `units` points to `count` units.
 pub(super) unsafe fn rule(units: *const mbm_unit, count: u8, function: u8) -> Option<Rule> {
     for index in 0..count {
         for service in Services::new(units.add(index.into())) {
@@ -133,9 +121,6 @@ pub unsafe extern "C" fn mbm_unit_serveCustom(unit: *mut mbm_unit, custom: *mut 
 
 /// Answers a disabled function with exception 01, and leaves any other to the services
 /// after this one.
-///
-/// # Safety
-/// `service` is the head of a `mbm_functionMask`; `pdu` points to a function code.
 unsafe extern "C" fn refuse_disabled(
     service: *mut mbm_service,
     pdu: *mut u8,

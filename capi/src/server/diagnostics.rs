@@ -8,19 +8,12 @@ use mbm::server::diagnostics::{Diagnostics, Restart};
 use mbm::server::{Addressing, Indication, Reply};
 
 /// The fields of a record that the core uses.
-///
-/// # Safety
-/// `record` is valid, and nothing else uses it while the reference lives.
 unsafe fn core_fields<'a>(record: *mut mbm_diagnostics) -> &'a mut Diagnostics {
     // `records.rs` asserts that the fields have the layout of the core's struct.
     &mut *(&raw mut (*record).diagnosticRegister).cast()
 }
 
 /// Serves functions 08, 0B and 0C (hex).
-///
-/// # Safety
-/// `service` is the head of a `mbm_diagnostics`; `pdu` has the length and the space that
-/// `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     // No reference lives while the hook runs.
     let record = service.cast::<mbm_diagnostics>();
@@ -33,9 +26,6 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 }
 
 /// Counts a frame, lets the unit serve it if it is for this unit, and counts the result.
-///
-/// # Safety
-/// `unit` is a unit with diagnostics; `pdu` has the length and the space that `info` gives.
 unsafe extern "C" fn monitor(
     unit: *mut mbm_unit,
     info: *const c_void,

@@ -176,9 +176,6 @@ impl Fifos for CFifos {
     }
 }
 
-/// # Safety
-/// `service` is the head of a `mbm_files`; `pdu` has the length and the space that `info`
-/// gives.
 unsafe extern "C" fn serve_files(
     service: *mut mbm_service,
     pdu: *mut u8,
@@ -190,8 +187,6 @@ unsafe extern "C" fn serve_files(
     files::serve(&mut files, pdu, length).code()
 }
 
-/// # Safety
-/// As for [`serve_files`], with a `mbm_fifos`.
 unsafe extern "C" fn serve_fifos(
     service: *mut mbm_service,
     pdu: *mut u8,

@@ -57,9 +57,6 @@ pub struct mbm_serverIdentification {
     pub count: u16,
 }
 
-/// # Safety
-/// `service` is the head of the struct that the function casts it to; `pdu` has the length
-/// and the space that `info` gives. The same holds for the functions below.
 unsafe extern "C" fn serve_exception_status(
     service: *mut mbm_service,
     pdu: *mut u8,

@@ -1,4 +1,8 @@
 //! `mbm_server_*`: a server on a line or connection, for C.
+//!
+//! What the unsafe functions in this folder demand: `service` is the head of the record to which the
+//! function casts it, `pdu` has the length and the space that `info` gives, and pointers to a unit,
+//! a record or a table are not NULL, unless they come from C.
 
 mod begin;
 mod buffers;

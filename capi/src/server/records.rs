@@ -81,9 +81,6 @@ pub struct mbm_custom {
 pub(super) const CUSTOM: u8 = 0x80;
 
 /// True if this is the head of a user's function.
-///
-/// # Safety
-/// `service` is the head of a record of any kind.
 pub(super) unsafe fn is_custom(service: *const mbm_service) -> bool {
     (*service).kind == CUSTOM
 }

@@ -69,9 +69,6 @@ pub(super) type AccessWithHooks = unsafe fn(
 ) -> Reply;
 
 /// The function that a table with hooks has.
-///
-/// # Safety
-/// `table` is a table.
 unsafe fn access_with_hooks(table: *const mbm_registerTable) -> Option<AccessWithHooks> {
     // `call` of a table is NULL or such a function.
     transmute((*table).hooks.call)
@@ -132,9 +129,6 @@ impl TableAccess for Table {
 
 /// True if a table has `quantity` cells from the index `first` on, and all of them are
 /// valid.
-///
-/// # Safety
-/// `table` is a table; `valid` is NULL or has `size` bits.
 unsafe fn contains(table: *const mbm_registerTable, first: usize, quantity: usize) -> bool {
     let size = usize::from((*table).size);
     if first >= size || quantity > size - first {
@@ -183,9 +177,6 @@ impl TableAccess for TableSnapshot {
 }
 
 /// Serves a request to a table.
-///
-/// # Safety
-/// `service` is the head of a table; `pdu` has the length and the space that `info` gives.
 unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const c_void) -> usize {
     let table = service.cast::<mbm_registerTable>();
     let kind = TableKind::from_code((*table).service.kind);
@@ -196,9 +187,6 @@ unsafe extern "C" fn serve(service: *mut mbm_service, pdu: *mut u8, info: *const
 }
 
 /// Serves functions 16 and 17 (hex) of a table of holding registers.
-///
-/// # Safety
-/// As for [`serve`].
 unsafe fn serve_mask_and_read_write(
     table: *mut mbm_registerTable,
     pdu: *mut u8,
@@ -211,9 +199,6 @@ unsafe fn serve_mask_and_read_write(
 }
 
 /// Serves holding registers, functions 16 and 17 (hex) too.
-///
-/// # Safety
-/// As for [`serve`].
 unsafe extern "C" fn serve_holding_registers(
     service: *mut mbm_service,
     pdu: *mut u8,
@@ -229,9 +214,6 @@ unsafe extern "C" fn serve_holding_registers(
 }
 
 /// Adds a table to a unit.
-///
-/// # Safety
-/// As for [`add_as`].
 unsafe extern "C" fn add_table(
     unit: *mut mbm_unit,
     table: *mut mbm_registerTable,

@@ -89,18 +89,12 @@ pub(super) unsafe fn add_as(
 }
 
 /// As [`add_as`], for a family with only one kind of record.
-///
-/// # Safety
-/// As for [`add_as`].
 pub(super) unsafe fn add(unit: *mut mbm_unit, service: *mut mbm_service, serve: Serve) -> u8 {
     add_as(unit, service, 1, serve).code()
 }
 
 /// As [`add`], for a family of records of which a unit serves only one: the unit would never
 /// call a second one. No other family has records of this `kind`. Returns [`Status::BUSY`] for it.
-///
-/// # Safety
-/// As for [`add`].
 pub(super) unsafe fn add_only(
     unit: *mut mbm_unit,
     service: *mut mbm_service,
@@ -151,7 +145,7 @@ impl Iterator for Services {
 /// of the request.
 ///
 /// # Safety
-/// As for [`Serve`]; nothing else uses the PDU while the slice lives.
+/// Nothing else uses the PDU while the slice lives.
 pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut [u8], usize) {
     let info = info.cast::<Indication>();
     let (space, length) = ((*info).space.into(), (*info).length.into());
@@ -160,9 +154,6 @@ pub(super) unsafe fn request<'a>(pdu: *mut u8, info: *const c_void) -> (&'a mut 
 }
 
 /// Calls the services of a unit one after the other until one of them answers the request.
-///
-/// # Safety
-/// `unit` is a unit; `pdu` has the length and the space that `info` gives.
 // In line, a server of four tables takes 12 bytes less on a Cortex-M0+ and 68 on an AVR.
 #[inline(always)]
 pub(super) unsafe fn call_services(
@@ -189,9 +180,6 @@ pub(super) unsafe fn call_services(
 }
 
 /// What the services of the unit that were called lack.
-///
-/// # Safety
-/// As for [`Serve`].
 pub(super) unsafe fn refusal_of(info: *const c_void) -> *mut Refusal {
     // `info` is part of a server, which is not constant.
     &raw mut (*info.cast::<Indication>().cast_mut()).refusal
@@ -203,9 +191,6 @@ const _: () = {
 };
 
 /// Passes a request to one service. A zeroed record has no function and handles nothing.
-///
-/// # Safety
-/// As for [`Serve`].
 unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut u8) -> usize {
     match (*service).serve {
         Some(serve) => serve(service, pdu, info),
@@ -214,18 +199,12 @@ unsafe fn call_service(service: *mut mbm_service, info: *const c_void, pdu: *mut
 }
 
 /// True if the unit has at least one service.
-///
-/// # Safety
-/// `unit` is a unit.
 unsafe fn serves(unit: *const mbm_unit) -> bool {
     let first = (&raw const (*unit).services).cast::<*mut mbm_service>();
     !(*first).is_null()
 }
 
 /// True if every unit has an id that a request can have.
-///
-/// # Safety
-/// `units` points to `count` units.
 // This loop takes less flash than `all`: 12 bytes on a Cortex-M0+, 34 on an AVR.
 #[inline(always)]
 pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
@@ -241,9 +220,6 @@ pub(crate) unsafe fn have_ids(units: *const mbm_unit, count: u8) -> bool {
 }
 
 /// True if one of the units answers this id, and for 0, the address of a broadcast.
-///
-/// # Safety
-/// `units` points to `count` units.
 pub(super) unsafe fn have(units: *const mbm_unit, count: u8, id: u8) -> bool {
     let (mut unit, mut left) = (units, count);
     while left != 0 {
@@ -258,9 +234,6 @@ pub(super) unsafe fn have(units: *const mbm_unit, count: u8, id: u8) -> bool {
 }
 
 /// Passes a frame to each unit. The first unit that it addresses answers.
-///
-/// # Safety
-/// `units` points to `count` units; `pdu` has the length and the space that `info` gives.
 #[cfg_attr(target_arch = "avr", inline(always))]
 pub(super) unsafe fn serve(
     units: *mut mbm_unit,
@@ -279,7 +252,7 @@ pub(super) unsafe fn serve(
     dispatch(&mut frame, all).code()
 }
 
-/// A frame, and the units that have not seen it yet. The pointers are as for [`serve`];
+/// A frame, and the units that have not seen it yet. The pointers are arguments of [`serve`];
 /// no reference lives while a unit runs.
 struct UnitsForFrame {
     unit: *mut mbm_unit,
@@ -293,7 +266,7 @@ impl Dispatch for UnitsForFrame {
 
     #[inline(always)]
     fn next(&mut self) -> Option<*mut mbm_unit> {
-        // SAFETY: as for `serve`.
+        // SAFETY: the arguments of `serve`.
         unsafe {
             loop {
                 if self.left == 0 {
@@ -312,13 +285,13 @@ impl Dispatch for UnitsForFrame {
 
     #[inline(always)]
     fn is_for(&self, unit: &*mut mbm_unit) -> bool {
-        // SAFETY: as for `serve`.
+        // SAFETY: the arguments of `serve`.
         unsafe { (*self.info).is_for((**unit).id) }
     }
 
     #[inline(always)]
     fn offer(&mut self, unit: *mut mbm_unit, addressing: Addressing) -> Option<Reply> {
-        // SAFETY: as for `serve`.
+        // SAFETY: the arguments of `serve`.
         let reply = unsafe {
             let (info, pdu) = (self.info.cast(), self.pdu);
             match (*unit).monitor {
@@ -332,17 +305,11 @@ impl Dispatch for UnitsForFrame {
 }
 
 /// True for a broadcast of a function that a unit does not carry out as a broadcast.
-///
-/// # Safety
-/// As for [`Serve`].
 pub(super) unsafe fn is_ignored_broadcast(info: *const c_void, function: u8) -> bool {
     (*info.cast::<Indication>()).is_broadcast() && !only_writes(function)
 }
 
 /// As [`add`], but puts the service before all others of the unit.
-///
-/// # Safety
-/// As for [`add`].
 pub(super) unsafe fn add_first(unit: *mut mbm_unit, new: *mut mbm_service, serve: Serve) -> u8 {
     let status = add(unit, new, serve);
     if status == Status::OK.code() {

@@ -68,9 +68,6 @@ impl Object {
 c_object! { mbm_sniffer, &mut Object }
 
 /// Changes the settings of a sniffer, or returns the status that says why not.
-///
-/// # Safety
-/// As for [`pointers::with`].
 unsafe fn with(sniffer: *mut mbm_sniffer, change: impl FnOnce(&mut Sniffer)) -> u8 {
     pointers::change(sniffer, |object| change(&mut object.core))
 }

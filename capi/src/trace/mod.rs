@@ -71,9 +71,6 @@ c_object! { mbm_trace, *mut Core, core }
 
 /// Runs `action` on the core of a trace, or returns the status that says why not. `action` may
 /// call hooks.
-///
-/// # Safety
-/// As for [`check`].
 unsafe fn with_core<T>(
     trace: *mut mbm_trace,
     action: impl FnOnce(&mut Core) -> T,
@@ -137,9 +134,6 @@ unsafe extern "C" fn post_transmission(context: *mut c_void) {
 }
 
 /// Begins a trace; see [`mbm_trace_begin`].
-///
-/// # Safety
-/// Each argument is as the header requires.
 #[allow(clippy::too_many_arguments)]
 unsafe fn begin(
     trace: *mut mbm_trace,
@@ -197,9 +191,6 @@ unsafe fn begin(
 }
 
 /// A copy of the description of frames, if it is valid.
-///
-/// # Safety
-/// `framing` is NULL or points to a description whose declarations are valid.
 unsafe fn described(framing: In<mbm_framing>) -> Result<(mbm_framing, Framing), Error> {
     let described = framing.get()?;
     declared(described.functions()?, None)?;
