@@ -63,74 +63,46 @@ pub extern "C" fn mbm_bits_unpack(bytes: In<u8>, length: u16, coils: Out<u8>, qu
     }))
 }
 
-/// Gets the state of one coil or discrete input of a read, by its address in the device.
-///
-/// @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
-/// @param first     the address of the first coil of the read
-/// @param quantity  the number of coils that were read; `bytes` holds that many bits
-/// @param address   the address of the coil
-/// @param on        receives 0 or 1
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
-///         passes address 65535
-#[no_mangle]
-pub extern "C" fn mbm_bits_isSet(
-    bytes: In<u8>,
-    first: u16,
-    quantity: u16,
-    address: u16,
-    on: Out<u8>,
-) -> u8 {
-    read_bit(bytes, first, quantity, address, on)
-}
+functions! {
+    ()
 
-/// Sets one coil of a write, by its address in the device. The other coils do not change.
-///
-/// @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
-/// @param first     the address of the first coil of the write
-/// @param quantity  the number of coils of the write; `bytes` holds that many bits
-/// @param address   the address of the coil
-/// @param on        0 is off, any other value is on
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
-///         passes address 65535
-#[no_mangle]
-pub extern "C" fn mbm_bits_set(
-    bytes: Out<u8>,
-    first: u16,
-    quantity: u16,
-    address: u16,
-    on: u8,
-) -> u8 {
-    set(bytes, first, quantity, address, on)
-}
+    /// Gets the state of one coil or discrete input of a read, by its address in the device.
+    ///
+    /// @param bytes     the bits of the read, 8 in each byte; the first coil is the lowest bit
+    /// @param first     the address of the first coil of the read
+    /// @param quantity  the number of coils that were read; `bytes` holds that many bits
+    /// @param address   the address of the coil
+    /// @param on        receives 0 or 1
+    /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+    ///         passes address 65535
+    fn mbm_bits_isSet(bytes: In<u8>, first: u16, quantity: u16, address: u16, on: Out<u8>)
+        = read_bit(bytes, first, quantity, address, on);
 
-/// As mbm_bits_isSet, but in words, for example the response words of a node.
-///
-/// @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
-///         passes address 65535
-#[no_mangle]
-pub extern "C" fn mbm_bits_isSetInWords(
-    words: In<u16>,
-    first: u16,
-    quantity: u16,
-    address: u16,
-    on: Out<u8>,
-) -> u8 {
-    read_bit(words, first, quantity, address, on)
-}
+    /// Sets one coil of a write, by its address in the device. The other coils do not change.
+    ///
+    /// @param bytes     the bits of the write, 8 in each byte; the first coil is the lowest bit
+    /// @param first     the address of the first coil of the write
+    /// @param quantity  the number of coils of the write; `bytes` holds that many bits
+    /// @param address   the address of the coil
+    /// @param on        0 is off, any other value is on
+    /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+    ///         passes address 65535
+    fn mbm_bits_set(bytes: Out<u8>, first: u16, quantity: u16, address: u16, on: u8)
+        = set(bytes, first, quantity, address, on);
 
-/// As mbm_bits_set, but in words, for example the transmit words of a node.
-///
-/// @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
-/// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
-///         passes address 65535
-#[no_mangle]
-pub extern "C" fn mbm_bits_setInWords(
-    words: Out<u16>,
-    first: u16,
-    quantity: u16,
-    address: u16,
-    on: u8,
-) -> u8 {
-    set(words, first, quantity, address, on)
+    /// As mbm_bits_isSet, but in words, for example the response words of a node.
+    ///
+    /// @param words     the bits of the read, 16 in each word; the first coil is the lowest bit
+    /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the read or the read
+    ///         passes address 65535
+    fn mbm_bits_isSetInWords(words: In<u16>, first: u16, quantity: u16, address: u16, on: Out<u8>)
+        = read_bit(words, first, quantity, address, on);
+
+    /// As mbm_bits_set, but in words, for example the transmit words of a node.
+    ///
+    /// @param words     the bits of the write, 16 in each word; the first coil is the lowest bit
+    /// @return a status; MBM_ILLEGAL_DATA_ADDRESS if the coil is outside of the write or the write
+    ///         passes address 65535
+    fn mbm_bits_setInWords(words: Out<u16>, first: u16, quantity: u16, address: u16, on: u8)
+        = set(words, first, quantity, address, on);
 }

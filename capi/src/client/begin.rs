@@ -72,41 +72,31 @@ unsafe fn give_up(client: *mut mbm_client) -> Status {
     Status::NOT_INITIALISED
 }
 
-/// Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
-///
-/// This and the other mbm_client_begin functions may be called again at any time, also with
-/// another framing. Then the client gives up all pending requests as mbm_client_cancel does:
-/// their status is MBM_CANCELLED and `done` is not called. All settings return to their
-/// defaults. A call that is refused changes nothing.
-///
-/// @param port        the port, which is copied; read, write and micros must not be NULL
-/// @param frame       the buffer of one frame, valid for as long as the client is used
-/// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
-/// @return a status; MBM_BUSY also while the client is suspended
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_beginRtu(
-    client: *mut mbm_client,
-    port: *const mbm_port,
-    frame: *mut u8,
-    frameBytes: u16,
-) -> u8 {
-    begin(client, port, frame, frameBytes, &kind::RTU)
-}
+functions! {
+    (client: *mut mbm_client)
 
-/// Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
-/// keeps no gap between frames. If no character arrives for one second, the client discards
-/// an incomplete frame.
-///
-/// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
-/// @return as mbm_client_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_beginAscii(
-    client: *mut mbm_client,
-    port: *const mbm_port,
-    frame: *mut u8,
-    frameBytes: u16,
-) -> u8 {
-    begin(client, port, frame, frameBytes, &kind::ASCII)
+    /// Begins a client of a serial line with RTU frames (serial line guide V1.02, 2.5.1).
+    ///
+    /// This and the other mbm_client_begin functions may be called again at any time, also with
+    /// another framing. Then the client gives up all pending requests as mbm_client_cancel does:
+    /// their status is MBM_CANCELLED and `done` is not called. All settings return to their
+    /// defaults. A call that is refused changes nothing.
+    ///
+    /// @param port        the port, which is copied; read, write and micros must not be NULL
+    /// @param frame       the buffer of one frame, valid for as long as the client is used
+    /// @param frameBytes  bytes of `frame`, at least 8; 256 hold any frame
+    /// @return a status; MBM_BUSY also while the client is suspended
+    fn mbm_client_beginRtu(port: *const mbm_port, frame: *mut u8, frameBytes: u16)
+        = begin(port, frame, frameBytes, &kind::RTU);
+
+    /// Begins a client of a serial line with ASCII frames (serial line guide V1.02, 2.5.2). It
+    /// keeps no gap between frames. If no character arrives for one second, the client discards
+    /// an incomplete frame.
+    ///
+    /// @param frameBytes  bytes of `frame`, at least 17; 513 hold any frame
+    /// @return as mbm_client_beginRtu
+    fn mbm_client_beginAscii(port: *const mbm_port, frame: *mut u8, frameBytes: u16)
+        = begin(port, frame, frameBytes, &kind::ASCII);
 }
 
 /// Sets the character that ends ASCII frames after CR, instead of LF, in both
@@ -133,18 +123,15 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
     })
 }
 
-/// Begins a client that sends RTU frames through a TCP stream, for converters that pass
-/// bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
-///
-/// @return as mbm_client_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_beginRtuOverTcp(
-    client: *mut mbm_client,
-    port: *const mbm_port,
-    frame: *mut u8,
-    frameBytes: u16,
-) -> u8 {
-    begin(client, port, frame, frameBytes, &kind::RTU_OVER_TCP)
+functions! {
+    (client: *mut mbm_client)
+
+    /// Begins a client that sends RTU frames through a TCP stream, for converters that pass
+    /// bytes from TCP to a serial line unchanged. It keeps no gap and does not broadcast.
+    ///
+    /// @return as mbm_client_beginRtu
+    fn mbm_client_beginRtuOverTcp(port: *const mbm_port, frame: *mut u8, frameBytes: u16)
+        = begin(port, frame, frameBytes, &kind::RTU_OVER_TCP);
 }
 
 /// Begins a client of a TCP stream with frames that have the MBAP header (messaging on

@@ -106,22 +106,19 @@ pub unsafe extern "C" fn mbm_client_setBusyRetries(
     })
 }
 
-/// Sets how long a request waits before the client repeats it. Meanwhile the client sends
-/// other requests.
-///
-/// @param backoff     MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
-/// @param delayMs     the wait before the first repetition, in milliseconds, 0 to 1000000
-/// @param maxDelayMs  the longest wait, in milliseconds, 0 to 1000000
-#[no_mangle]
-pub unsafe extern "C" fn mbm_client_setBackoff(
-    client: *mut mbm_client,
-    backoff: u8,
-    delayMs: u32,
-    maxDelayMs: u32,
-) -> u8 {
-    set(client, |parts| {
-        set_backoff(&mut parts.queue.policy.waits, backoff, delayMs, maxDelayMs)
-    })
+functions! {
+    (client: *mut mbm_client)
+
+    /// Sets how long a request waits before the client repeats it. Meanwhile the client sends
+    /// other requests.
+    ///
+    /// @param backoff     MBM_BACKOFF_NONE (the default) to MBM_BACKOFF_EXPONENTIAL
+    /// @param delayMs     the wait before the first repetition, in milliseconds, 0 to 1000000
+    /// @param maxDelayMs  the longest wait, in milliseconds, 0 to 1000000
+    fn mbm_client_setBackoff(backoff: u8, delayMs: u32, maxDelayMs: u32)
+        = set(|parts| {
+            set_backoff(&mut parts.queue.policy.waits, backoff, delayMs, maxDelayMs)
+        });
 }
 
 /// Sets `waits`, with the arguments of [`mbm_client_setBackoff`].

@@ -3,13 +3,11 @@
 
 use super::mbm_plan;
 use super::setup::mbm_planField;
-use super::values::{find, find_words};
+use super::values::{double, find, find_words};
 use crate::pointers::{In, Out};
 use crate::registers::{mbm_registers, view, MBM_ORDER_DEFAULT};
 use core::mem::MaybeUninit;
 use mbm::data::order::Order;
-#[cfg(target_arch = "avr")]
-use mbm::data::value::{ShortDouble, Value as _};
 use mbm::error::{Error, Status};
 use mbm::plan::conversion::{power, Conversion};
 use mbm::plan::field::TEXT;
@@ -164,18 +162,6 @@ fn with_words<T>(
         before,
         field: &own,
     })
-}
-
-/// A double of C.
-#[cfg(not(target_arch = "avr"))]
-fn double(bits: u64) -> u64 {
-    bits
-}
-
-/// A double of C, which is a float here.
-#[cfg(target_arch = "avr")]
-fn double(bits: u64) -> f32 {
-    ShortDouble::from_bytes(bits.to_be_bytes()).0
 }
 
 functions! {

@@ -149,81 +149,57 @@ pub unsafe extern "C" fn mbm_plan_getStatus(
     read.status().code()
 }
 
-/// A value as an integer: multiplied and divided as its field says, rounded to the nearest,
-/// halves away from 0.
-///
-/// @param field  the index of the field, of a bit or an integer
-/// @param index  which of its values, 0 for the first
-/// @param value  gets the number
-/// @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
-///         for a float, a text or MBM_TYPE_REGISTERS; if no value has arrived yet the status that
-///         mbm_plan_getStatus returns
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getInteger(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: Out<i64>,
-) -> u8 {
-    get(plan, field, index, value, |words| words.integer())
+/// A double of C, as its bits.
+#[cfg(not(target_arch = "avr"))]
+pub(super) fn double(bits: u64) -> u64 {
+    bits
 }
 
-/// As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
-///
-/// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
-/// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of the
-///         divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64 bits
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getInt32(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: Out<i32>,
-) -> u8 {
-    get(plan, field, index, value, |words| words.int32())
+/// A double of C, which is a float here.
+#[cfg(target_arch = "avr")]
+pub(super) fn double(bits: u64) -> f32 {
+    ShortDouble::from_bytes(bits.to_be_bytes()).0
 }
 
-/// A bit, an integer or a float as a double: multiplied and divided as its field says, and
-/// rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
-/// that.
-///
-/// @param value  gets the number; a float that is infinite or not a number stays so
-/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text or
-///         MBM_TYPE_REGISTERS
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getNumber(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: Out<f64>,
-) -> u8 {
-    // A double is its bits.
-    #[cfg(not(target_arch = "avr"))]
-    {
-        get(plan, field, index, value.cast(), |words| words.number())
-    }
-    // C's double is a float here.
-    #[cfg(target_arch = "avr")]
-    {
-        get(plan, field, index, value.cast(), |words| {
-            Ok(ShortDouble::from_bytes(words.number()?.to_be_bytes()).0)
-        })
-    }
-}
+functions! {
+    (plan: *const mbm_plan)
 
-/// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
-/// to the nearest; without the scale of its field.
-///
-/// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
-#[no_mangle]
-pub unsafe extern "C" fn mbm_plan_getFloat(
-    plan: *const mbm_plan,
-    field: u16,
-    index: u16,
-    value: Out<f32>,
-) -> u8 {
-    // A float is its bits.
-    get(plan, field, index, value.cast(), |words| words.float())
+    /// A value as an integer: multiplied and divided as its field says, rounded to the nearest,
+    /// halves away from 0.
+    ///
+    /// @param field  the index of the field, of a bit or an integer
+    /// @param index  which of its values, 0 for the first
+    /// @param value  gets the number
+    /// @return a status; MBM_OUT_OF_RANGE if it is not in the range of `value`; MBM_INVALID_ARGUMENT
+    ///         for a float, a text or MBM_TYPE_REGISTERS; if no value has arrived yet the status that
+    ///         mbm_plan_getStatus returns
+    fn mbm_plan_getInteger(field: u16, index: u16, value: Out<i64>)
+        = get(field, index, value, |words| words.integer());
+
+    /// As mbm_plan_getInteger, but with 32 bits throughout: less code on a microcontroller.
+    ///
+    /// @param field  the index of the field, of a bit or of an integer of 16 or 32 bits
+    /// @return as mbm_plan_getInteger; MBM_OUT_OF_RANGE also if the value, multiplied, plus half of the
+    ///         divisor is not less than 2^32; MBM_INVALID_ARGUMENT also for an integer of 64 bits
+    fn mbm_plan_getInt32(field: u16, index: u16, value: Out<i32>)
+        = get(field, index, value, |words| words.int32());
+
+    /// A bit, an integer or a float as a double: multiplied and divided as its field says, and
+    /// rounded once, to the nearest. On AVR, where C's double has 32 bits, it is rounded to these after
+    /// that.
+    ///
+    /// @param value  gets the number; a float that is infinite or not a number stays so
+    /// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT only for a text or
+    ///         MBM_TYPE_REGISTERS
+    fn mbm_plan_getNumber(field: u16, index: u16, value: Out<f64>)
+        = get(field, index, value.cast(), |words| words.number().map(double));
+
+    /// A value of type MBM_TYPE_FLOAT, whose bits are copied, or MBM_TYPE_DOUBLE, which is rounded
+    /// to the nearest; without the scale of its field.
+    ///
+    /// @return as mbm_plan_getInteger; MBM_INVALID_ARGUMENT for other types
+    fn mbm_plan_getFloat(field: u16, index: u16, value: Out<f32>)
+        = get(field, index, value.cast(), |words| words.float());
 }
 
 /// A text, which ends at its first NUL or with its field. In an order with the low byte first,

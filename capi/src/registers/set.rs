@@ -146,26 +146,22 @@ pub extern "C" fn mbm_registers_setString(
     })
 }
 
-/// Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
-/// register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low
-/// byte, for a device that swaps the bytes of its registers.
-///
-/// @param registers  the registers, of a kind that may be written
-/// @param address    the device's address of the first register
-/// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
-/// @param bytes      the bytes; must not overlap the registers
-/// @param length     how many bytes, two for each register; if it is odd, the other byte of the
-///                   last register does not change
-/// @return a status; see mbm_registers
-#[no_mangle]
-pub extern "C" fn mbm_registers_setBytes(
-    registers: In<mbm_registers>,
-    address: u16,
-    order: u8,
-    bytes: In<u8>,
-    length: u16,
-) -> u8 {
-    with(registers, order, |registers| {
-        registers.set_bytes_in(registers.order, address, bytes.slice(length.into())?)
-    })
+functions! {
+    (registers: In<mbm_registers>)
+
+    /// Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
+    /// register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low
+    /// byte, for a device that swaps the bytes of its registers.
+    ///
+    /// @param registers  the registers, of a kind that may be written
+    /// @param address    the device's address of the first register
+    /// @param order      one of MBM_ORDER_...; MBM_ORDER_DEFAULT for the order of `registers`
+    /// @param bytes      the bytes; must not overlap the registers
+    /// @param length     how many bytes, two for each register; if it is odd, the other byte of the
+    ///                   last register does not change
+    /// @return a status; see mbm_registers
+    fn mbm_registers_setBytes(address: u16, order: u8, bytes: In<u8>, length: u16)
+        = with(order, |registers| {
+            registers.set_bytes_in(registers.order, address, bytes.slice(length.into())?)
+        });
 }

@@ -58,106 +58,75 @@ unsafe fn begin(
     Status::OK
 }
 
-/// Begins a server for RTU on a serial line. The baud rate is unknown at first, so 4 ms
-/// of silence end a frame: see mbm_server_setBaudRate.
-///
-/// You may call it again at any time, but not from within a hook of the server. The server then
-/// drops the request that it serves and the response that it sends; if it was sending, it calls
-/// postTransmission of the previous port to switch the driver off. A call that fails changes
-/// nothing. The function does not open the port. The units and the buffer must stay valid, at
-/// the same address, for as long as the server is used. Several servers may share units. The
-/// buffer holds no data between requests.
-///
-/// @param port   is copied; its hooks read, write and micros are required
-/// @param units  the units to serve: one unit, or an array of units
-/// @param count  how many units
-/// @param frame  buffer for one frame, a request or a response
-/// @param bytes  size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The server
-///               ignores a longer request, and answers exception 04 in place of a longer response
-/// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_beginRtu(
+/// As [`begin`], with a frame buffer of at least `least` bytes.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+unsafe fn begin_with(
     server: *mut mbm_server,
     port: *const mbm_port,
     units: *mut mbm_unit,
     count: u8,
     frame: *mut u8,
     bytes: u16,
+    least: u16,
+    framing: fn(&mut Core),
 ) -> u8 {
-    begin(server, port, units, count, frame, bytes, Core::begin_rtu).code()
-}
-
-/// Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
-/// server drops a frame if the next character takes longer than one second.
-///
-/// @param bytes  size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
-/// @return a status; see mbm_server_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_beginAscii(
-    server: *mut mbm_server,
-    port: *const mbm_port,
-    units: *mut mbm_unit,
-    count: u8,
-    frame: *mut u8,
-    bytes: u16,
-) -> u8 {
-    if bytes < 2 * MIN_FRAME {
+    if bytes < least {
         return Status::INVALID_ARGUMENT.code();
     }
-    begin(server, port, units, count, frame, bytes, Core::begin_ascii).code()
+    begin(server, port, units, count, frame, bytes, framing).code()
 }
 
-/// Begins a server on an accepted TCP connection. If several requests are in the stream,
-/// the server answers them in order.
-///
-/// @param port   see mbm_server_beginRtu; its hooks read and write the connection and give the time
-/// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
-/// @param frame  see mbm_server_beginRtu; one for each connection
-/// @param bytes  size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
-/// @return a status; see mbm_server_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_beginTcp(
-    server: *mut mbm_server,
-    port: *const mbm_port,
-    units: *mut mbm_unit,
-    count: u8,
-    frame: *mut u8,
-    bytes: u16,
-) -> u8 {
-    if bytes < MBM_MAX_TCP_FRAME {
-        return Status::INVALID_ARGUMENT.code();
-    }
-    begin(server, port, units, count, frame, bytes, Core::begin_tcp).code()
-}
+functions! {
+    (server: *mut mbm_server, port: *const mbm_port, units: *mut mbm_unit, count: u8,
+        frame: *mut u8, bytes: u16)
 
-/// Begins a server for a stream of RTU frames without timing: a TCP connection that
-/// carries RTU, or a serial adapter that delivers bytes in blocks. The server finds the
-/// end of a frame from its bytes. After a damaged frame, half a second of silence ends
-/// the damaged bytes.
-///
-/// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
-/// @param frame  see mbm_server_beginRtu; one for each connection
-/// @param bytes  size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
-/// @return a status; see mbm_server_beginRtu
-#[no_mangle]
-pub unsafe extern "C" fn mbm_server_beginRtuOverTcp(
-    server: *mut mbm_server,
-    port: *const mbm_port,
-    units: *mut mbm_unit,
-    count: u8,
-    frame: *mut u8,
-    bytes: u16,
-) -> u8 {
-    begin(
-        server,
-        port,
-        units,
-        count,
-        frame,
-        bytes,
-        Core::begin_rtu_over_tcp,
-    )
-    .code()
+    /// Begins a server for RTU on a serial line. The baud rate is unknown at first, so 4 ms
+    /// of silence end a frame: see mbm_server_setBaudRate.
+    ///
+    /// You may call it again at any time, but not from within a hook of the server. The server then
+    /// drops the request that it serves and the response that it sends; if it was sending, it calls
+    /// postTransmission of the previous port to switch the driver off. A call that fails changes
+    /// nothing. The function does not open the port. The units and the buffer must stay valid, at
+    /// the same address, for as long as the server is used. Several servers may share units. The
+    /// buffer holds no data between requests.
+    ///
+    /// @param port   is copied; its hooks read, write and micros are required
+    /// @param units  the units to serve: one unit, or an array of units
+    /// @param count  how many units
+    /// @param frame  buffer for one frame, a request or a response
+    /// @param bytes  size of `frame` in bytes, at least 16. MBM_MAX_FRAME holds every frame. The server
+    ///               ignores a longer request, and answers exception 04 in place of a longer response
+    /// @return a status; MBM_INVALID_ARGUMENT for a unit with an id above 255
+    fn mbm_server_beginRtu() = begin_with(0, Core::begin_rtu);
+
+    /// Begins a server for ASCII on a serial line (serial line guide V1.02, 2.5.2). The
+    /// server drops a frame if the next character takes longer than one second.
+    ///
+    /// @param bytes  size of `frame` in bytes, at least 32; MBM_MAX_ASCII_FRAME holds every frame
+    /// @return a status; see mbm_server_beginRtu
+    fn mbm_server_beginAscii() = begin_with(2 * MIN_FRAME, Core::begin_ascii);
+
+    /// Begins a server on an accepted TCP connection. If several requests are in the stream,
+    /// the server answers them in order.
+    ///
+    /// @param port   see mbm_server_beginRtu; its hooks read and write the connection and give the time
+    /// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+    /// @param frame  see mbm_server_beginRtu; one for each connection
+    /// @param bytes  size of `frame` in bytes, at least MBM_MAX_TCP_FRAME
+    /// @return a status; see mbm_server_beginRtu
+    fn mbm_server_beginTcp() = begin_with(MBM_MAX_TCP_FRAME, Core::begin_tcp);
+
+    /// Begins a server for a stream of RTU frames without timing: a TCP connection that
+    /// carries RTU, or a serial adapter that delivers bytes in blocks. The server finds the
+    /// end of a frame from its bytes. After a damaged frame, half a second of silence ends
+    /// the damaged bytes.
+    ///
+    /// @param units  see mbm_server_beginRtu; the unit ids 0 and 255 address the first unit
+    /// @param frame  see mbm_server_beginRtu; one for each connection
+    /// @param bytes  size of `frame` in bytes, at least 16; MBM_MAX_FRAME holds every frame
+    /// @return a status; see mbm_server_beginRtu
+    fn mbm_server_beginRtuOverTcp() = begin_with(0, Core::begin_rtu_over_tcp);
 }
 
 /// Sets the silence that ends a frame. In RTU it is t3.5, in ASCII the longest time
