@@ -24,6 +24,8 @@ class Device(TcpDevice):
         self.manner = row.manner and row.manner()
         self.opened, self.begun, self.ended = [], [], []
         super().__init__()
+        # No program has connected before.
+        self.started = time.monotonic()
 
     def serve(self, peer):
         self.opened.append(time.monotonic())
@@ -117,6 +119,8 @@ def test_a_key_is_written(plain, write, port, broker, row):
     topic = f"row{ROWS.index(row)}"
     plain.begin("bridge", "-b", broker.place, "-t", topic, "-q", *PATIENT, device.line, path)
     subscriber = Subscriber(broker)
+    # It has subscribed to the topics of writes by then.
+    subscriber.expect_last(f"{topic}/status", "online")
     for name, value in row.values.items():
         subscriber.expect_value(f"{topic}/{name.replace(' ', '_')}", value)
     for name, payload, result, *wanted in row.writes:

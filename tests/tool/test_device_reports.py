@@ -4,7 +4,7 @@ the number of the report with a device file. The symptom of each stands before i
 import json
 
 import pytest
-from peers import DONE, EXCEPTION, NO_REPLY, PATIENT, WRONG, TcpDevice, bits, wait, word
+from peers import DONE, EXCEPTION, NO_REPLY, PATIENT, WRONG, TcpDevice, bits, word
 from services import Broker, Subscriber
 
 
@@ -151,7 +151,7 @@ def hall(plain, folder, write):
         broker = Broker(folder).come()
         plain.begin("bridge", "-b", broker.place, "-t", "hall", *PATIENT, device.line, write("device.yaml", text))
         subscriber = Subscriber(broker)
-        assert wait(lambda: any(topic.endswith("/status") and text == "online" for topic, text in list(subscriber.last.items())))
+        subscriber.expect_last("hall/status", "online")
         return lambda name, payload, pattern="success": subscriber.expect_result(f"hall/{name}", payload, pattern)
 
     return begin
