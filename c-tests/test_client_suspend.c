@@ -77,26 +77,26 @@ VARIANTS_TEST(a_client_resumes_only_from_the_one_who_has_its_line)
     static mbm_line fresh;
 
     OK(mbm_client_suspend(client, &line));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &other_line));
-    REFUSED(MBM_INVALID_ARGUMENT, other_line, mbm_client_resume(client, &other_line));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &fresh));
+    INVALID(*client, mbm_client_resume(client, NULL));
+    INVALID(*client, mbm_client_resume(client, &other_line));
+    INVALID(other_line, mbm_client_resume(client, &other_line));
+    INVALID(*client, mbm_client_resume(client, &fresh));
     /* The master still has the line. */
     IS(MBM_PENDING, mbm_node_readCoils(&node, 0, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, NULL));
+    INVALID(*client, mbm_client_resume(client, NULL));
     REFUSED(MBM_BUSY, *client, mbm_client_resume(client, &line));
     OK(mbm_node_cancel(&node));
     IS(MBM_BUSY, mbm_client_poll(client));
     OK(mbm_client_resume(client, &line));
     OK(mbm_client_poll(client));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
+    INVALID(*client, mbm_client_resume(client, &line));
 
     OK(mbm_client_suspend(client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
+    INVALID(*client, mbm_client_resume(client, &line));
     OK(mbm_client_resume(client, NULL));
     /* The next one to whom the line is given counts, not the one before. */
     OK(mbm_client_suspend(client, &other_line));
-    REFUSED(MBM_INVALID_ARGUMENT, *client, mbm_client_resume(client, &line));
+    INVALID(*client, mbm_client_resume(client, &line));
     OK(mbm_client_resume(client, &other_line));
 }
 

@@ -1,6 +1,7 @@
 /* Each function of the client and of its link is held to its comment in mbm.h: results, limits,
  * defaults, NULL. */
 #include "every_call.h"
+#include "exchanges.h"
 #include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
@@ -21,14 +22,10 @@ static void setup(void)
     memset(&wire, 0, sizeof wire);
     memset(&c, 0, sizeof c);
     memset(&never, 0, sizeof never);
-    memset(&r, 0, sizeof r);
     memset(&identification, 0, sizeof identification);
     wire.step = 100;
     port = hooked_port_of(&wire);
-    r.unit = 17;
-    r.data = data;
-    r.reply = reply;
-    r.replyBytes = sizeof reply;
+    r = (mbm_clientRequest){.unit = 17, .data = data, .reply = reply, .replyBytes = sizeof reply};
     OK(mbm_client_beginRtu(&c, &port, frame, sizeof frame));
 }
 
@@ -36,73 +33,36 @@ fixture each_test = {setup, NULL};
 
 /* --- requests --- */
 
-/* A request of every function, with an address and a quantity where it has them. */
-typedef uint8_t (*call)(mbm_client *client, mbm_clientRequest *request, uint16_t address,
-                        uint16_t quantity);
+/* What 17 writes. */
+enum { WRITE_OF_BOTH = 0x117 };
 
-#define CALL(name, ...)                                                                            \
-    static uint8_t call_##name(mbm_client *client, mbm_clientRequest *request, uint16_t address,   \
-                               uint16_t quantity)                                                  \
-    {                                                                                              \
-        return mbm_client_##name(client, request, __VA_ARGS__);                                    \
-    }
-#define CALL_OF_NOTHING(name)                                                                      \
-    static uint8_t call_##name(mbm_client *client, mbm_clientRequest *request, uint16_t address,   \
-                               uint16_t quantity)                                                  \
-    {                                                                                              \
-        return mbm_client_##name(client, request);                                                 \
-    }
-
-CALL(readCoils, address, quantity)
-CALL(readDiscreteInputs, address, quantity)
-CALL(readHoldingRegisters, address, quantity)
-CALL(readInputRegisters, address, quantity)
-CALL(writeSingleCoil, address, 1)
-CALL(writeSingleRegister, address, quantity)
-CALL_OF_NOTHING(readExceptionStatus)
-CALL_OF_NOTHING(getCommEventCounter)
-CALL_OF_NOTHING(getCommEventLog)
-CALL_OF_NOTHING(reportServerId)
-CALL(writeMultipleCoils, address, quantity)
-CALL(writeMultipleRegisters, address, quantity)
-CALL(maskWriteRegister, address, 1, 1)
-CALL(readFifoQueue, address)
-
-static uint8_t read_of_both(mbm_client *client, mbm_clientRequest *request, uint16_t address,
-                            uint16_t quantity)
-{
-    return mbm_client_readWriteMultipleRegisters(client, request, address, quantity, 0, 1);
-}
-
-static uint8_t write_of_both(mbm_client *client, mbm_clientRequest *request, uint16_t address,
-                             uint16_t quantity)
-{
-    return mbm_client_readWriteMultipleRegisters(client, request, 0, 1, address, quantity);
-}
-
-/* `most` is 0 if the function has no quantity. */
+/* Every function with an address, a quantity or a list of both. `most` is the largest quantity, 0
+ * if the function has none. */
 static const struct {
-    call call;
-    uint16_t most;
+    uint16_t function, most;
     uint8_t is_broadcast;
-} calls[] = {
-    {call_readCoils, 2000, 0},
-    {call_readDiscreteInputs, 2000, 0},
-    {call_readHoldingRegisters, 125, 0},
-    {call_readInputRegisters, 125, 0},
-    {call_writeSingleCoil, 0, 1},
-    {call_writeSingleRegister, 0, 1},
-    {call_readExceptionStatus, 0, 0},
-    {call_getCommEventCounter, 0, 0},
-    {call_getCommEventLog, 0, 0},
-    {call_reportServerId, 0, 0},
-    {call_writeMultipleCoils, 1968, 1},
-    {call_writeMultipleRegisters, 123, 1},
-    {call_maskWriteRegister, 0, 1},
-    {call_readFifoQueue, 0, 0},
-    {read_of_both, 125, 0},
-    {write_of_both, 121, 0},
-};
+} calls[] = {{0x01, 2000, 0}, {0x02, 2000, 0}, {0x03, 125, 0}, {0x04, 125, 0},
+             {0x05, 0, 1},    {0x06, 0, 1},    {0x07, 0, 0},   {0x0B, 0, 0},
+             {0x0C, 0, 0},    {0x0F, 1968, 1}, {0x10, 123, 1}, {0x11, 0, 0},
+             {0x16, 0, 1},    {0x17, 125, 0},  {0x18, 0, 0},   {WRITE_OF_BOTH, 121, 0}};
+
+static uint8_t call(unsigned function, mbm_client *client, mbm_clientRequest *request,
+                    uint16_t address, uint16_t quantity)
+{
+    exchange e = {.function = (uint8_t)function, .with = {address, quantity, 0, 1}};
+
+    switch (function) {
+    case 0x07: return mbm_client_readExceptionStatus(client, request);
+    case 0x0B: return mbm_client_getCommEventCounter(client, request);
+    case 0x0C: return mbm_client_getCommEventLog(client, request);
+    case 0x11: return mbm_client_reportServerId(client, request);
+    case 0x18: return mbm_client_readFifoQueue(client, request, address);
+    case WRITE_OF_BOTH: e = (exchange){.function = 0x17, .with = {0, 1, address, quantity}}; break;
+    default: break;
+    }
+#define CLIENT(name, ...) mbm_client_##name(client, request, __VA_ARGS__)
+    EXCHANGE_CALL(&e, CLIENT);
+}
 
 TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 {
@@ -124,7 +84,8 @@ TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
         for (unsigned nth = 0; nth < (most != 0 ? COUNT(rows) : 2u); nth++) {
             setup();
             r.exception = 7;
-            IS(rows[nth].status, calls[i].call(&c, &r, rows[nth].address, rows[nth].quantity));
+            IS(rows[nth].status,
+               call(calls[i].function, &c, &r, rows[nth].address, rows[nth].quantity));
             IS(rows[nth].status, r.status);
             assert_int_equal(r.exception, 0);
             assert_int_equal(mbm_client_pending(&c), rows[nth].status == MBM_PENDING);
@@ -135,24 +96,26 @@ TEST(a_quantity_and_an_address_have_the_limits_of_the_header)
 TEST(a_request_is_refused_before_it_is_queued)
 {
     for (unsigned i = 0; i < COUNT(calls); i++) {
+        const uint16_t function = calls[i].function;
+
         setup();
-        IS(MBM_INVALID_ARGUMENT, calls[i].call(NULL, &r, 0, 1));
-        IS(MBM_INVALID_ARGUMENT, calls[i].call(&c, NULL, 0, 1));
-        REFUSED(MBM_NOT_INITIALISED, never, calls[i].call(&never, &r, 0, 1));
+        IS(MBM_INVALID_ARGUMENT, call(function, NULL, &r, 0, 1));
+        IS(MBM_INVALID_ARGUMENT, call(function, &c, NULL, 0, 1));
+        REFUSED(MBM_NOT_INITIALISED, never, call(function, &never, &r, 0, 1));
         r.unit = 0;
         IS(calls[i].is_broadcast ? MBM_PENDING : MBM_BROADCAST_NOT_ALLOWED,
-           calls[i].call(&c, &r, 0, 1));
+           call(function, &c, &r, 0, 1));
         (void)mbm_client_cancel(&c, &r);
         r.unit = 17;
-        IS(MBM_PENDING, calls[i].call(&c, &r, 0, 1));
+        IS(MBM_PENDING, call(function, &c, &r, 0, 1));
         /* It is pending, and may not be used again. */
-        REFUSED(MBM_BUSY, r, calls[i].call(&c, &r, 0, 1));
+        REFUSED(MBM_BUSY, r, call(function, &c, &r, 0, 1));
         OK(mbm_client_cancel(&c, &r));
         IS(MBM_CANCELLED, r.status);
         REFUSED(MBM_NOT_PENDING, r, mbm_client_cancel(&c, &r));
         /* No repetitions without their code. */
         r.retryLimit = 1;
-        IS(MBM_INVALID_ARGUMENT, calls[i].call(&c, &r, 0, 1));
+        IS(MBM_INVALID_ARGUMENT, call(function, &c, &r, 0, 1));
         assert_int_equal(mbm_client_pending(&c), 0);
     }
 }
@@ -181,10 +144,10 @@ TEST(a_queue_holds_sixteen_requests)
         IS(MBM_CANCELLED, many[i].status);
 }
 
-/* Asserts whether a request is within its limits, and gives it up. */
-#define WITHIN(is, what)                                                                           \
+/* Makes a request and gives it up. */
+#define ANSWERS(status, request, ...)                                                              \
     do {                                                                                           \
-        assert_int_equal((what) == MBM_PENDING, is);                                               \
+        IS(status, mbm_client_##request(&c, &r, __VA_ARGS__));                                     \
         (void)mbm_client_cancel(&c, &r);                                                           \
     } while (0)
 
@@ -195,74 +158,71 @@ TEST(functions_with_bodies_check_them)
     uint8_t pdu[MBM_MAX_PDU];
     mbm_packet packet;
 
-#define ANSWERS(status, what)                                                                      \
-    do {                                                                                           \
-        IS(status, what);                                                                          \
-        (void)mbm_client_cancel(&c, &r);                                                           \
-    } while (0)
     r.data = bytes;
-    WITHIN(0, mbm_client_custom(&c, &r, 0, 1, &silence));
-    WITHIN(1, mbm_client_custom(&c, &r, 1, 1, &silence));
-    WITHIN(1, mbm_client_custom(&c, &r, 127, 0, &silence));
-    WITHIN(0, mbm_client_custom(&c, &r, 128, 1, &silence));
-    WITHIN(1, mbm_client_custom(&c, &r, 0x41, 252, &silence));
-    WITHIN(0, mbm_client_custom(&c, &r, 0x41, 253, &silence));
-    WITHIN(0, mbm_client_custom(&c, &r, 0x41, 1, NULL));
-    WITHIN(0, mbm_client_custom(&never, &r, 0x41, 1, &silence));
-    WITHIN(1, mbm_client_diagnostics(&c, &r, 0, 1));
-    WITHIN(1, mbm_client_diagnostics(&c, &r, 0, 125));
-    WITHIN(0, mbm_client_diagnostics(&c, &r, 0, 0));
-    WITHIN(0, mbm_client_diagnostics(&c, &r, 0, 126));
-    WITHIN(1, mbm_client_diagnostics(&c, &r, 10, 1));
-    WITHIN(0, mbm_client_diagnostics(&c, &r, 10, 2));
+#define WITHIN(...) ANSWERS(MBM_PENDING, __VA_ARGS__)
+#define VALUE(...) ANSWERS(MBM_ILLEGAL_DATA_VALUE, __VA_ARGS__)
+    ANSWERS(MBM_ILLEGAL_FUNCTION, custom, 0, 1, &silence);
+    WITHIN(custom, 1, 1, &silence);
+    WITHIN(custom, 127, 0, &silence);
+    ANSWERS(MBM_ILLEGAL_FUNCTION, custom, 128, 1, &silence);
+    WITHIN(custom, 0x41, 252, &silence);
+    VALUE(custom, 0x41, 253, &silence);
+    ANSWERS(MBM_INVALID_ARGUMENT, custom, 0x41, 1, NULL);
+    IS(MBM_NOT_INITIALISED, mbm_client_custom(&never, &r, 0x41, 1, &silence));
+    WITHIN(diagnostics, 0, 1);
+    WITHIN(diagnostics, 0, 125);
+    VALUE(diagnostics, 0, 0);
+    VALUE(diagnostics, 0, 126);
+    WITHIN(diagnostics, 10, 1);
+    VALUE(diagnostics, 10, 2);
     for (uint8_t code = 0; code < 6; code++)
-        WITHIN(code >= MBM_DEVICE_ID_BASIC && code <= MBM_DEVICE_ID_INDIVIDUAL,
-               mbm_client_readDeviceIdentification(&c, &r, code, 255));
-    WITHIN(1, mbm_client_readFileRecord(&c, &r, 1, 0, 1));
-    WITHIN(1, mbm_client_readFileRecord(&c, &r, 65535, 9879, 121));
-    WITHIN(0, mbm_client_readFileRecord(&c, &r, 0, 0, 1));
-    WITHIN(0, mbm_client_readFileRecord(&c, &r, 1, 10000, 1));
-    WITHIN(0, mbm_client_readFileRecord(&c, &r, 1, 0, 0));
-    WITHIN(0, mbm_client_readFileRecord(&c, &r, 1, 0, 122));
-    WITHIN(1, mbm_client_writeFileRecord(&c, &r, 1, 0, 122));
-    WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 123));
-    WITHIN(0, mbm_client_writeFileRecord(&c, &r, 1, 0, 0));
-    WITHIN(0, mbm_client_writeFileRecord(&c, &r, 0, 0, 1));
-    WITHIN(1, mbm_client_readFileRecords(&c, &r, 7));
-    WITHIN(1, mbm_client_readFileRecords(&c, &r, 245));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 0));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 8));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 252));
-    WITHIN(0, mbm_client_readFileRecords(&c, &r, 256 + 7));
-    WITHIN(1, mbm_client_writeFileRecords(&c, &r, 9));
-    WITHIN(1, mbm_client_writeFileRecords(&c, &r, 251));
-    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 8));
-    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 252));
-    WITHIN(0, mbm_client_writeFileRecords(&c, &r, 256 + 9));
-    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 0));
-    WITHIN(1, mbm_client_encapsulatedInterfaceTransport(&c, &r, 255, 251));
-    WITHIN(0, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 252));
-    WITHIN(0, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 256));
+        ANSWERS(code >= MBM_DEVICE_ID_BASIC && code <= MBM_DEVICE_ID_INDIVIDUAL
+                    ? MBM_PENDING
+                    : MBM_ILLEGAL_DATA_VALUE,
+                readDeviceIdentification, code, 255);
+    WITHIN(readFileRecord, 1, 0, 1);
+    WITHIN(readFileRecord, 65535, 9879, 121);
+    ANSWERS(MBM_ILLEGAL_DATA_ADDRESS, readFileRecord, 0, 0, 1);
+    ANSWERS(MBM_ILLEGAL_DATA_ADDRESS, readFileRecord, 1, 10000, 1);
+    VALUE(readFileRecord, 1, 0, 0);
+    VALUE(readFileRecord, 1, 0, 122);
+    WITHIN(writeFileRecord, 1, 0, 122);
+    VALUE(writeFileRecord, 1, 0, 123);
+    VALUE(writeFileRecord, 1, 0, 0);
+    ANSWERS(MBM_ILLEGAL_DATA_ADDRESS, writeFileRecord, 0, 0, 1);
+    WITHIN(readFileRecords, 7);
+    WITHIN(readFileRecords, 245);
+    VALUE(readFileRecords, 0);
+    VALUE(readFileRecords, 8);
+    VALUE(readFileRecords, 252);
+    VALUE(readFileRecords, 256 + 7);
+    WITHIN(writeFileRecords, 9);
+    WITHIN(writeFileRecords, 251);
+    VALUE(writeFileRecords, 8);
+    VALUE(writeFileRecords, 252);
+    VALUE(writeFileRecords, 256 + 9);
+    WITHIN(encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 0);
+    WITHIN(encapsulatedInterfaceTransport, 255, 251);
+    VALUE(encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 252);
+    VALUE(encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 256);
     r.data = NULL;
-    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_readFileRecords(&c, &r, 7));
-    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_writeFileRecords(&c, &r, 9));
-    ANSWERS(MBM_INVALID_ARGUMENT,
-            mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 1));
-    ANSWERS(MBM_PENDING, mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 0));
+    ANSWERS(MBM_INVALID_ARGUMENT, readFileRecords, 7);
+    ANSWERS(MBM_INVALID_ARGUMENT, writeFileRecords, 9);
+    ANSWERS(MBM_INVALID_ARGUMENT, encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 1);
+    WITHIN(encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 0);
     r.data = bytes;
     r.unit = 0;
-    ANSWERS(MBM_BROADCAST_NOT_ALLOWED, mbm_client_readFileRecords(&c, &r, 7));
-    ANSWERS(MBM_PENDING, mbm_client_writeFileRecords(&c, &r, 9));
-    ANSWERS(MBM_BROADCAST_NOT_ALLOWED,
-            mbm_client_encapsulatedInterfaceTransport(&c, &r, MBM_MEI_CANOPEN, 1));
+    ANSWERS(MBM_BROADCAST_NOT_ALLOWED, readFileRecords, 7);
+    WITHIN(writeFileRecords, 9);
+    ANSWERS(MBM_BROADCAST_NOT_ALLOWED, encapsulatedInterfaceTransport, MBM_MEI_CANOPEN, 1);
     r.unit = 17;
-    ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 0, bytes, 1));
-    ANSWERS(MBM_ILLEGAL_FUNCTION, mbm_client_forward(&c, &r, 128, bytes, 1));
-    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_forward(&c, &r, 0x41, NULL, 1));
-    ANSWERS(MBM_PENDING, mbm_client_forward(&c, &r, 0x41, NULL, 0));
-    ANSWERS(MBM_PENDING, mbm_client_forward(&c, &r, 0x41, bytes, 252));
-    ANSWERS(MBM_ILLEGAL_DATA_VALUE, mbm_client_forward(&c, &r, 0x41, bytes, 253));
-    ANSWERS(MBM_INVALID_ARGUMENT, mbm_client_forward(NULL, &r, 0x41, bytes, 1));
+    ANSWERS(MBM_ILLEGAL_FUNCTION, forward, 0, bytes, 1);
+    ANSWERS(MBM_ILLEGAL_FUNCTION, forward, 128, bytes, 1);
+    ANSWERS(MBM_INVALID_ARGUMENT, forward, 0x41, NULL, 1);
+    WITHIN(forward, 0x41, NULL, 0);
+    WITHIN(forward, 0x41, bytes, 252);
+    VALUE(forward, 0x41, bytes, 253);
+    IS(MBM_INVALID_ARGUMENT, mbm_client_forward(NULL, &r, 0x41, bytes, 1));
     IS(MBM_INVALID_ARGUMENT, mbm_client_reply(NULL, pdu, sizeof pdu, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&r, NULL, sizeof pdu, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_client_reply(&r, pdu, sizeof pdu, NULL));
@@ -271,59 +231,58 @@ TEST(functions_with_bodies_check_them)
     identification.request = r;
     IS(MBM_INVALID_ARGUMENT, mbm_identification_read(NULL, &c, 1, 0));
     IS(MBM_INVALID_ARGUMENT, mbm_identification_read(&identification, NULL, 1, 0));
-    REFUSED(MBM_ILLEGAL_DATA_VALUE, identification,
-            mbm_identification_read(&identification, &c, 5, 0));
-    REFUSED(MBM_ILLEGAL_DATA_VALUE, identification,
-            mbm_identification_read(&identification, &c, 0, 0));
-    REFUSED(MBM_NOT_INITIALISED, identification,
-            mbm_identification_read(&identification, &never, 1, 0));
+#define IDENTIFIES(status, client, code)                                                           \
+    REFUSED(status, identification, mbm_identification_read(&identification, client, code, 0))
+    IDENTIFIES(MBM_ILLEGAL_DATA_VALUE, &c, 5);
+    IDENTIFIES(MBM_ILLEGAL_DATA_VALUE, &c, 0);
+    IDENTIFIES(MBM_NOT_INITIALISED, &never, 1);
     identification.request.reply = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, identification,
-            mbm_identification_read(&identification, &c, 1, 0));
+    IDENTIFIES(MBM_INVALID_ARGUMENT, &c, 1);
 }
 
 /* --- begin --- */
 
-static uint8_t begin(unsigned framing, mbm_client *client, const mbm_port *on, uint8_t *bytes,
-                     uint16_t size)
-{
-    return client_begin(client, framing, on, bytes, size, outgoing, 12);
-}
-
 TEST(a_begin_is_refused_without_a_change)
 {
     static const uint16_t least[] = {8, 17, 9, 8};
-    mbm_port lacking;
 
     for (unsigned i = 0; i < COUNT(least); i++) {
+#define BEGIN(client, port, frame, bytes) client_begin(client, i, port, frame, bytes, outgoing, 12)
         setup();
-        OK(begin(i, &c, &port, frame, least[i]));
-        IS(MBM_INVALID_ARGUMENT, begin(i, NULL, &port, frame, 300));
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, NULL, frame, 300));
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, &port, NULL, 300));
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, &port, frame, least[i] - 1));
-        lacking = port;
-        lacking.read = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, &lacking, frame, 300));
-        lacking = port;
-        lacking.write = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, &lacking, frame, 300));
-        lacking = port;
-        lacking.micros = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, c, begin(i, &c, &lacking, frame, 300));
+        OK(BEGIN(&c, &port, frame, least[i]));
+        IS(MBM_INVALID_ARGUMENT, BEGIN(NULL, &port, frame, 300));
+        INVALID(c, BEGIN(&c, NULL, frame, 300));
+        INVALID(c, BEGIN(&c, &port, NULL, 300));
+        INVALID(c, BEGIN(&c, &port, frame, least[i] - 1));
+        for (int hook = HOOK_READ; hook <= HOOK_MICROS; hook++) {
+            const mbm_port lacking = hooked_port_without(&wire, hook);
+
+            INVALID(c, BEGIN(&c, &lacking, frame, 300));
+        }
         OK(mbm_client_suspend(&c, NULL));
-        REFUSED(MBM_BUSY, c, begin(i, &c, &port, frame, 300));
+        REFUSED(MBM_BUSY, c, BEGIN(&c, &port, frame, 300));
         IS(MBM_BUSY, mbm_client_poll(&c));
         IS(MBM_BUSY, mbm_client_reconnect(&c, NULL));
         IS(MBM_BUSY, mbm_client_suspend(&c, NULL));
         OK(mbm_client_resume(&c, NULL));
         IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&c, NULL));
     }
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_beginTcp(&c, &port, frame, 9, NULL, 12));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_beginTcp(&c, &port, frame, 9, outgoing, 11));
+    INVALID(c, mbm_client_beginTcp(&c, &port, frame, 9, NULL, 12));
+    INVALID(c, mbm_client_beginTcp(&c, &port, frame, 9, outgoing, 11));
 }
 
 /* --- settings --- */
+
+/* The limits of settings that a client and a link have. */
+#define RANGES_OF_TRIES(object, type)                                                              \
+    do {                                                                                           \
+        INVALID(object, mbm_##type##_setBackoff(&(object), 4, 1, 1));                              \
+        INVALID(object, mbm_##type##_setBackoff(&(object), 1, 1000001, 1));                        \
+        INVALID(object, mbm_##type##_setBackoff(&(object), 1, 1, 1000001));                        \
+        OK(mbm_##type##_setJitter(&(object), 100, random_number, NULL));                           \
+        INVALID(object, mbm_##type##_setJitter(&(object), 101, random_number, NULL));              \
+        INVALID(object, mbm_##type##_setJitter(&(object), 1, NULL, NULL));                         \
+    } while (0)
 
 static uint32_t random_number(void *context)
 {
@@ -345,19 +304,26 @@ static uint32_t gap(void)
 
 TEST(the_gap_is_that_of_the_header)
 {
+    static const uint32_t rates[][2] = {{19200, 2006}, {9600, 4011}, {115200, 1750}, {0, 4000}};
+
     assert_int_equal(gap(), 4000);
-    OK(mbm_client_setBaudRate(&c, 19200));
-    assert_int_equal(gap(), 2006);
-    OK(mbm_client_setBaudRate(&c, 9600));
-    assert_int_equal(gap(), 4011);
-    OK(mbm_client_setBaudRate(&c, 115200));
-    assert_int_equal(gap(), 1750);
-    OK(mbm_client_setBaudRate(&c, 0));
-    assert_int_equal(gap(), 4000);
+    for (unsigned i = 0; i < COUNT(rates); i++) {
+        OK(mbm_client_setBaudRate(&c, rates[i][0]));
+        assert_int_equal(gap(), rates[i][1]);
+    }
     OK(mbm_client_setGap(&c, 5));
     assert_int_equal(gap(), 5);
     OK(mbm_client_beginRtu(&c, &port, frame, sizeof frame));
     assert_int_equal(gap(), 4000);
+}
+
+/* Polls until the request has ended, and lets the time of pollDelay pass. */
+static uint8_t run(void)
+{
+    wire.step = 0;
+    while (mbm_client_poll(&c) == MBM_PENDING)
+        wire.now += mbm_client_pollDelay(&c) + 1;
+    return r.status;
 }
 
 /* How many times a request is sent that nothing answers, and how long all of it takes. */
@@ -365,12 +331,9 @@ static unsigned frames(uint32_t *us)
 {
     uint32_t begin = wire.now;
 
-    wire.step = 0;
     wire.called[HOOK_WRITE] = 0;
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&c, &r, 0, 1));
-    while (mbm_client_poll(&c) == MBM_PENDING)
-        wire.now += mbm_client_pollDelay(&c) + 1;
-    IS(MBM_RESPONSE_TIMED_OUT, r.status);
+    IS(MBM_RESPONSE_TIMED_OUT, run());
     *us = wire.now - begin;
     return wire.called[HOOK_WRITE];
 }
@@ -388,9 +351,7 @@ TEST(a_begin_restores_the_defaults_of_the_header)
         r.unit = 0;
         us = wire.now;
         IS(MBM_PENDING, mbm_client_writeSingleRegister(&c, &r, 0, 1));
-        while (mbm_client_poll(&c) == MBM_PENDING)
-            wire.now += mbm_client_pollDelay(&c) + 1;
-        OK(r.status);
+        OK(run());
         assert_in_range(wire.now - us, 100000, 104100); /* gap and turnaround delay */
         r.unit = 17;
         OK(mbm_client_setResponseTimeout(&c, 1));
@@ -404,26 +365,17 @@ TEST(settings_have_the_ranges_of_the_header)
 {
     static mbm_clientUnit units[2];
 
-    OK(mbm_client_setResponseTimeout(&c, 1000000));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setResponseTimeout(&c, 1000001));
-    OK(mbm_client_setTurnaroundDelay(&c, 65535));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setTurnaroundDelay(&c, 65536));
-    OK(mbm_client_setQuietTime(&c, 65535));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setQuietTime(&c, 65536));
-    OK(mbm_client_setMessageWait(&c, 65535));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setMessageWait(&c, 65536));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setAccept(&c, 4));
+    RANGE(c, 1000000, mbm_client_setResponseTimeout);
+    RANGE(c, 65535, mbm_client_setTurnaroundDelay);
+    RANGE(c, 65535, mbm_client_setQuietTime);
+    RANGE(c, 65535, mbm_client_setMessageWait);
+    INVALID(c, mbm_client_setAccept(&c, 4));
     OK(mbm_client_setLenient(&c, 0));
     OK(mbm_client_setBusyRetries(&c, 255, 65535));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBusyRetries(&c, 1, 65536));
+    INVALID(c, mbm_client_setBusyRetries(&c, 1, 65536));
     OK(mbm_client_setBackoff(&c, MBM_BACKOFF_EXPONENTIAL, 1000000, 1000000));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBackoff(&c, 4, 1, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBackoff(&c, 1, 1000001, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setBackoff(&c, 1, 1, 1000001));
-    OK(mbm_client_setJitter(&c, 100, random_number, NULL));
+    RANGES_OF_TRIES(c, client);
     OK(mbm_client_setJitter(&c, 0, NULL, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setJitter(&c, 101, random_number, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setJitter(&c, 1, NULL, NULL));
     OK(mbm_client_setGap(&c, 0xFFFFFFFF));
     OK(mbm_client_setBaudRate(&c, 19200));
     OK(mbm_client_setRetries(&c, 255));
@@ -433,17 +385,12 @@ TEST(settings_have_the_ranges_of_the_header)
     OK(mbm_client_setUnits(&c, NULL, 2));
     OK(mbm_client_setUnits(&c, NULL, 0));
     OK(mbm_client_setCounters(&c, NULL));
-    for (unsigned i = 0; i < 256; i++) {
-        if (i == 1)
-            OK(mbm_client_setInFlight(&c, 1));
-        else
-            REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, (uint8_t)i));
-    }
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setDelimiter(&c, '\n'));
+    for (unsigned i = 0; i < 256; i++)
+        REFUSED(i == 1 ? MBM_OK : MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, (uint8_t)i));
+    INVALID(c, mbm_client_setDelimiter(&c, '\n'));
     OK(mbm_client_beginTcp(&c, &port, frame, 260, outgoing, sizeof outgoing));
-    OK(mbm_client_setInFlight(&c, 16));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 17));
-    REFUSED(MBM_INVALID_ARGUMENT, c, mbm_client_setInFlight(&c, 0));
+    RANGE(c, 16, mbm_client_setInFlight);
+    INVALID(c, mbm_client_setInFlight(&c, 0));
     OK(mbm_client_beginAscii(&c, &port, frame, 513));
     for (unsigned i = 0; i < 256; i++) {
         int is_digit = (i >= '0' && i <= '9') || (i >= 'A' && i <= 'F') || (i >= 'a' && i <= 'f');
@@ -515,32 +462,24 @@ TEST(a_link_has_the_limits_of_the_header)
     memset(&link, 0, sizeof link);
     memset(&other, 0, sizeof other);
     IS(MBM_INVALID_ARGUMENT, mbm_link_begin(NULL, &c, &hooks));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_begin(&link, NULL, &hooks));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_begin(&link, &c, NULL));
+    INVALID(link, mbm_link_begin(&link, NULL, &hooks));
+    INVALID(link, mbm_link_begin(&link, &c, NULL));
     REFUSED(MBM_NOT_INITIALISED, link, mbm_link_begin(&link, &never, &hooks));
     hooks.connect = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_begin(&link, &c, &hooks));
+    INVALID(link, mbm_link_begin(&link, &c, &hooks));
     hooks.connect = connect_at_once;
     OK(mbm_link_begin(&link, &c, &hooks));
     REFUSED(MBM_BUSY, other, mbm_link_begin(&other, &c, &hooks));
     assert_int_equal(mbm_link_state(&link), 0);
     OK(mbm_link_setConnectTimeout(&link, 0));
-    OK(mbm_link_setConnectTimeout(&link, 1000000));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setConnectTimeout(&link, 1000001));
+    RANGE(link, 1000000, mbm_link_setConnectTimeout);
     OK(mbm_link_setDelayAfterConnect(&link, 0));
-    OK(mbm_link_setDelayAfterConnect(&link, 65535));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setDelayAfterConnect(&link, 65536));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setClose(&link, 4));
+    RANGE(link, 65535, mbm_link_setDelayAfterConnect);
+    INVALID(link, mbm_link_setClose(&link, 4));
     OK(mbm_link_setReplaceAfter(&link, 0));
-    OK(mbm_link_setReplaceAfter(&link, 100));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setReplaceAfter(&link, 101));
+    RANGE(link, 100, mbm_link_setReplaceAfter);
     OK(mbm_link_setBackoff(&link, MBM_BACKOFF_NONE, 1000000, 1000000));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setBackoff(&link, 4, 1, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setBackoff(&link, 1, 1000001, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setBackoff(&link, 1, 1, 1000001));
-    OK(mbm_link_setJitter(&link, 100, random_number, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setJitter(&link, 101, random_number, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, link, mbm_link_setJitter(&link, 1, NULL, NULL));
+    RANGES_OF_TRIES(link, link);
     OK(mbm_link_setRequestsWait(&link, 1));
     OK(mbm_link_setCallback(&link, NULL, NULL));
     OK(mbm_link_setCounters(&link, NULL));

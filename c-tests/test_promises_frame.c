@@ -165,9 +165,9 @@ TEST(every_null_is_refused)
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(NULL, &packet, frame, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, NULL, 99, &length));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_build(&rtu, &packet, frame + 20, 99, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(NULL, 0, frame, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
+    INVALID(packet, mbm_frame_parse(NULL, 0, frame, 8, &packet));
+    INVALID(packet, mbm_frame_parse(&rtu, 2, frame, 8, &packet));
+    INVALID(packet, mbm_frame_parse(&rtu, 0, NULL, 8, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_parse(&rtu, 0, frame, 8, NULL));
     kept = packet;
     IS(MBM_INVALID_ARGUMENT, mbm_frame_exception(NULL, &packet, 1, frame, 11, &length));
@@ -474,14 +474,14 @@ TEST(records_are_added_within_their_limits)
     mbm_packet packet = {.kind = MBM_PACKET_REQUEST, .function = MBM_FC_WRITE_FILE_RECORD};
     mbm_record record = {.data = words, .file = 1, .record = 9999, .length = 1};
 
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, NULL, 251, &record));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, NULL));
+    INVALID(packet, mbm_packet_addRecord(&packet, NULL, 251, &record));
+    INVALID(packet, mbm_packet_addRecord(&packet, storage, 251, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addRecord(NULL, storage, 251, &record));
     packet.function = MBM_FC_READ_COILS;
     REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
     packet.function = MBM_FC_WRITE_FILE_RECORD;
     packet.kind = MBM_PACKET_EXCEPTION;
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    INVALID(packet, mbm_packet_addRecord(&packet, storage, 251, &record));
     packet.kind = MBM_PACKET_REQUEST;
     record.file = 0;
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
@@ -490,14 +490,14 @@ TEST(records_are_added_within_their_limits)
     REFUSED(MBM_ILLEGAL_DATA_ADDRESS, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
     record.record = 9999;
     record.data = storage + 10;
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    INVALID(packet, mbm_packet_addRecord(&packet, storage, 251, &record));
     record.data = words;
     REFUSED(MBM_BUFFER_TOO_SMALL, packet, mbm_packet_addRecord(&packet, storage, 8, &record));
     OK(mbm_packet_addRecord(&packet, storage, 9, &record));
     assert_int_equal(packet.dataLength, 9);
     assert_ptr_equal(packet.data, storage);
     packet.data = words;
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, storage, 251, &record));
+    INVALID(packet, mbm_packet_addRecord(&packet, storage, 251, &record));
     /* As many as fit into a frame: 27 of one register, and 251 bytes are enough. */
     packet.data = storage;
     while (mbm_packet_addRecord(&packet, storage, sizeof storage, &record) == MBM_OK)
@@ -514,8 +514,8 @@ TEST(objects_are_added_within_their_limits)
                          .meiType = MBM_MEI_READ_DEVICE_IDENTIFICATION};
     mbm_object object = {.data = value, .length = 5, .id = 0x80};
 
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, NULL, 246, &object));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, NULL));
+    INVALID(packet, mbm_packet_addObject(&packet, NULL, 246, &object));
+    INVALID(packet, mbm_packet_addObject(&packet, storage, 246, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_packet_addObject(NULL, storage, 246, &object));
     packet.meiType = MBM_MEI_CANOPEN;
     REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addObject(&packet, storage, 246, &object));
@@ -524,14 +524,14 @@ TEST(objects_are_added_within_their_limits)
     REFUSED(MBM_ILLEGAL_FUNCTION, packet, mbm_packet_addObject(&packet, storage, 246, &object));
     packet.kind = MBM_PACKET_RESPONSE;
     object.data = storage;
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    INVALID(packet, mbm_packet_addObject(&packet, storage, 246, &object));
     object.data = value;
     REFUSED(MBM_BUFFER_TOO_SMALL, packet, mbm_packet_addObject(&packet, storage, 6, &object));
     OK(mbm_packet_addObject(&packet, storage, 7, &object));
     assert_int_equal(packet.dataLength, 7);
     assert_int_equal(packet.objectCount, 1);
     packet.data = value;
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, storage, 246, &object));
+    INVALID(packet, mbm_packet_addObject(&packet, storage, 246, &object));
     packet.data = storage;
     while (mbm_packet_addObject(&packet, storage, sizeof storage, &object) == MBM_OK)
         assert_in_range(packet.dataLength, 14, 246);
@@ -634,9 +634,9 @@ TEST(a_refused_call_leaves_other_variables_unchanged)
     uint16_t cursor = 0;
 
     memset(&packet, 0x77, sizeof packet);
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(&none, 0, frame, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 2, frame, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parse(PDU(NULL, 0), 0, NULL, 8, &packet));
+    INVALID(packet, mbm_frame_parse(&none, 0, frame, 8, &packet));
+    INVALID(packet, mbm_frame_parse(PDU(NULL, 0), 2, frame, 8, &packet));
+    INVALID(packet, mbm_frame_parse(PDU(NULL, 0), 0, NULL, 8, &packet));
     memset(&packet, 0, sizeof packet);
     memset(&record, 0x77, sizeof record);
     memset(&object, 0x77, sizeof object);
@@ -647,8 +647,8 @@ TEST(a_refused_call_leaves_other_variables_unchanged)
     packet.dataLength = 7;
     REFUSED(0, cursor, mbm_packet_nextRecord(&packet, &cursor, NULL));
     REFUSED(1, packet, mbm_packet_nextRecord(&packet, &cursor, &record));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addRecord(&packet, NULL, 8, &record));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_packet_addObject(&packet, frame, 8, &object));
+    INVALID(packet, mbm_packet_addRecord(&packet, NULL, 8, &record));
+    INVALID(packet, mbm_packet_addObject(&packet, frame, 8, &object));
     memset(&sniffer, 0, sizeof sniffer);
     memset(&event, 0x77, sizeof event);
     REFUSED(0, event, mbm_sniffer_next(&sniffer, 0, &event));

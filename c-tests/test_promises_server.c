@@ -1,4 +1,5 @@
 /* Each function of servers and units is held to its comment in mbm.h: results, limits, NULL. */
+#include "every_call.h"
 #include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
@@ -11,6 +12,7 @@ static mbm_server server;
 static mbm_unit unit;
 static mbm_registerTable table;
 static mbm_bitTable bit_table;
+static mbm_functionMask mask;
 static uint16_t words[4];
 static uint8_t frame[MBM_MAX_ASCII_FRAME], bits[1];
 
@@ -18,60 +20,50 @@ static void setup(void)
 {
     memset(&wire, 0, sizeof wire);
     memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
-    memset(&table, 0, sizeof table);
-    memset(&bit_table, 0, sizeof bit_table);
     port = hooked_port_of(&wire);
-    unit.id = 17;
-    table.words = words;
-    table.size = COUNT(words);
-    bit_table.bits = bits;
-    bit_table.size = 8;
+    unit = (mbm_unit){.id = 17};
+    table = (mbm_registerTable){.words = words, .size = COUNT(words)};
+    bit_table = (mbm_bitTable){.bits = bits, .size = 8};
+    mask = (mbm_functionMask){0};
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
 }
 
 fixture each_test = {setup, NULL};
 
-typedef uint8_t (*begins_server)(mbm_server *server, const mbm_port *port, mbm_unit *units,
-                                 uint8_t count, uint8_t *frame, uint16_t bytes);
-
-/* The begin functions: the shortest buffer, and the silence by default in microseconds. */
+/* The begin functions by framing: the shortest buffer, and the silence by default in microseconds.
+ * In TCP no silence ends a frame. */
 static const struct {
-    begins_server begin;
     uint16_t least;
     uint32_t silence;
-    uint8_t is_rtu;
-} begins[] = {{mbm_server_beginRtu, 16, 4000, 1},
-              {mbm_server_beginAscii, 32, 1000000, 0},
-              {mbm_server_beginTcp, MBM_MAX_TCP_FRAME, 0, 0},
-              {mbm_server_beginRtuOverTcp, 16, 500000, 0}};
+} begins[] = {{16, 4000}, {32, 1000000}, {MBM_MAX_TCP_FRAME, UINT32_MAX}, {16, 500000}};
+
+static void begin(unsigned framing)
+{
+    OK(server_begin(&server, framing, &port, &unit, 1, frame, 300));
+}
 
 /* --- servers --- */
 
 TEST(a_begin_is_refused_without_a_change)
 {
     for (unsigned i = 0; i < COUNT(begins); i++) {
-        begins_server begin = begins[i].begin;
-        uint16_t least = begins[i].least;
-        mbm_port lacking;
+        const uint16_t least = begins[i].least;
 
         setup();
-        OK(begin(&server, &port, &unit, 1, frame, least));
-        IS(MBM_INVALID_ARGUMENT, begin(NULL, &port, &unit, 1, frame, least));
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, NULL, &unit, 1, frame, least));
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &port, NULL, 1, frame, least));
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &port, &unit, 1, NULL, least));
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &port, &unit, 1, frame, least - 1));
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &port, &unit, 1, frame, 0));
-        lacking = port;
-        lacking.read = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &lacking, &unit, 1, frame, 300));
-        lacking = port;
-        lacking.write = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &lacking, &unit, 1, frame, 300));
-        lacking = port;
-        lacking.micros = NULL;
-        REFUSED(MBM_INVALID_ARGUMENT, server, begin(&server, &lacking, &unit, 1, frame, 300));
+        OK(server_begin(&server, i, &port, &unit, 1, frame, least));
+        IS(MBM_INVALID_ARGUMENT, server_begin(NULL, i, &port, &unit, 1, frame, least));
+#define BEGIN(port, unit, frame, bytes)                                                            \
+    INVALID(server, server_begin(&server, i, port, unit, 1, frame, bytes))
+        BEGIN(NULL, &unit, frame, least);
+        BEGIN(&port, NULL, frame, least);
+        BEGIN(&port, &unit, NULL, least);
+        BEGIN(&port, &unit, frame, least - 1);
+        BEGIN(&port, &unit, frame, 0);
+        for (int hook = HOOK_READ; hook <= HOOK_MICROS; hook++) {
+            const mbm_port lacking = hooked_port_without(&wire, hook);
+
+            BEGIN(&lacking, &unit, frame, 300);
+        }
     }
 }
 
@@ -86,58 +78,57 @@ static uint32_t silence(void)
 
 TEST(a_begin_restores_the_defaults_of_its_framing)
 {
-    for (unsigned first = 0; first < COUNT(begins); first++) {
+    for (unsigned first = 0; first < COUNT(begins); first++)
         for (unsigned i = 0; i < COUNT(begins); i++) {
             setup();
-            OK(begins[first].begin(&server, &port, &unit, 1, frame, 300));
+            begin(first);
             OK(mbm_server_setSilence(&server, 77));
             OK(mbm_server_setReceiveLatency(&server, 7));
-            if (begins[first].is_rtu)
+            if (first == MBM_FRAMING_RTU)
                 OK(mbm_server_setEchoDiscard(&server, 1));
-            OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
-            /* In TCP no silence ends a frame. */
-            assert_int_equal(silence(), begins[i].silence ? begins[i].silence : UINT32_MAX);
+            begin(i);
+            assert_int_equal(silence(), begins[i].silence);
         }
-    }
 }
 
 TEST(a_server_that_was_never_begun_does_nothing)
 {
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_poll(&server));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setSilence(&server, 1));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setReceiveLatency(&server, 1));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setBaudRate(&server, 9600));
-    REFUSED(MBM_NOT_INITIALISED, server, mbm_server_setEchoDiscard(&server, 1));
-    assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
-    IS(MBM_INVALID_ARGUMENT, mbm_server_poll(NULL));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setSilence(NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setReceiveLatency(NULL, 1));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setBaudRate(NULL, 9600));
-    IS(MBM_INVALID_ARGUMENT, mbm_server_setEchoDiscard(NULL, 1));
-    assert_int_equal(mbm_server_pollDelay(NULL), 0xFFFFFFFF);
+    mbm_server *const servers[] = {NULL, &server};
+
+    for (unsigned i = 0; i < COUNT(servers); i++) {
+        const uint8_t status = i == 0 ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
+
+        REFUSED(status, server, mbm_server_poll(servers[i]));
+        REFUSED(status, server, mbm_server_setSilence(servers[i], 1));
+        REFUSED(status, server, mbm_server_setReceiveLatency(servers[i], 1));
+        REFUSED(status, server, mbm_server_setBaudRate(servers[i], 9600));
+        REFUSED(status, server, mbm_server_setEchoDiscard(servers[i], 1));
+        assert_int_equal(mbm_server_pollDelay(servers[i]), 0xFFFFFFFF);
+    }
 }
 
 TEST(settings_of_rtu_are_refused_in_other_framings)
 {
+    /* The silence is that of 3.5 characters, each of 11 bits. */
+    static const uint32_t rates[][2] = {{9600, 4011}, {115200, 1750}, {0, 4000}};
+
     for (unsigned i = 0; i < COUNT(begins); i++) {
         setup();
-        OK(begins[i].begin(&server, &port, &unit, 1, frame, 300));
-        if (begins[i].is_rtu) {
-            OK(mbm_server_setBaudRate(&server, 9600));
-            assert_int_equal(silence(), 4011); /* 3.5 * 11 / 9600 s */
-            OK(mbm_server_setBaudRate(&server, 115200));
-            assert_int_equal(silence(), 1750);
-            OK(mbm_server_setBaudRate(&server, 0));
-            assert_int_equal(silence(), 4000);
+        begin(i);
+        if (i == MBM_FRAMING_RTU) {
+            for (unsigned k = 0; k < COUNT(rates); k++) {
+                OK(mbm_server_setBaudRate(&server, rates[k][0]));
+                assert_int_equal(silence(), rates[k][1]);
+            }
             OK(mbm_server_setEchoDiscard(&server, 200));
             OK(mbm_server_setEchoDiscard(&server, 0));
         } else {
-            REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setBaudRate(&server, 9600));
-            REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_setEchoDiscard(&server, 1));
+            INVALID(server, mbm_server_setBaudRate(&server, 9600));
+            INVALID(server, mbm_server_setEchoDiscard(&server, 1));
         }
         OK(mbm_server_setReceiveLatency(&server, 0xFFFF));
         OK(mbm_server_setSilence(&server, 0xFFFFFFFF));
-        if (begins[i].is_rtu)
+        if (i == MBM_FRAMING_RTU)
             assert_int_equal(silence(), 0x80000000);
         OK(mbm_server_setSilence(&server, 0));
     }
@@ -147,7 +138,7 @@ TEST(a_poll_reports_what_its_comment_says)
 {
     static const uint8_t no_tcp[8] = {1, 2, 3, 4, 5, 6, 7, 8};
 
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, 256));
+    begin(MBM_FRAMING_RTU);
     assert_int_equal(mbm_server_pollDelay(&server), 0);
     OK(mbm_server_poll(&server));
     assert_int_equal(mbm_server_pollDelay(&server), 0xFFFFFFFF);
@@ -161,7 +152,7 @@ TEST(a_poll_reports_what_its_comment_says)
     wire.lost = 1;
     IS(MBM_LINK_LOST, mbm_server_poll(&server));
     wire.lost = 0;
-    OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, MBM_MAX_TCP_FRAME));
+    begin(MBM_FRAMING_TCP);
     hooked_port_arrive(&wire, no_tcp, sizeof no_tcp);
     IS(MBM_MALFORMED_FRAME, mbm_server_poll(&server));
 }
@@ -178,7 +169,6 @@ TEST(records_are_refused_without_a_change)
 {
     static mbm_dataCallbacks cells;
     static mbm_custom custom;
-    static mbm_functionMask mask;
     static mbm_diagnostics diagnostics, other;
     static mbm_files files;
     static mbm_fifos fifos;
@@ -187,54 +177,46 @@ TEST(records_are_refused_without_a_change)
     static mbm_serverIdentification identification;
     static mbm_registerTable other_table;
 
-#define NULLS(function, record)                                                                    \
-    do {                                                                                           \
-        REFUSED(MBM_INVALID_ARGUMENT, unit, function(&unit, NULL));                                \
-        REFUSED(MBM_INVALID_ARGUMENT, record, function(NULL, &record));                            \
-    } while (0)
-    NULLS(mbm_unit_serveCoils, bit_table);
-    NULLS(mbm_unit_serveDiscreteInputs, bit_table);
-    NULLS(mbm_unit_serveHoldingRegisters, table);
-    NULLS(mbm_unit_serveInputRegisters, table);
-    NULLS(mbm_unit_serveCustom, custom);
-    NULLS(mbm_unit_serveDiagnostics, diagnostics);
-    NULLS(mbm_unit_serveFiles, files);
-    NULLS(mbm_unit_serveFifos, fifos);
-    NULLS(mbm_unit_serveExceptionStatus, status);
-    NULLS(mbm_unit_serveServerId, id);
-    NULLS(mbm_unit_serveIdentification, identification);
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCallbacks(&unit, NULL, 3));
-    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_unit_serveCallbacks(NULL, &cells, 3));
+#define NULLS(serve, record)                                                                       \
+    INVALID(unit, mbm_unit_##serve(&unit, NULL));                                                  \
+    INVALID(record, mbm_unit_##serve(NULL, &record))
+    NULLS(serveCoils, bit_table);
+    NULLS(serveDiscreteInputs, bit_table);
+    NULLS(serveHoldingRegisters, table);
+    NULLS(serveInputRegisters, table);
+    NULLS(serveCustom, custom);
+    NULLS(serveDiagnostics, diagnostics);
+    NULLS(serveFiles, files);
+    NULLS(serveFifos, fifos);
+    NULLS(serveExceptionStatus, status);
+    NULLS(serveServerId, id);
+    NULLS(serveIdentification, identification);
+    INVALID(unit, mbm_unit_serveCallbacks(&unit, NULL, 3));
+    INVALID(cells, mbm_unit_serveCallbacks(NULL, &cells, 3));
     /* Without `get`. */
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCallbacks(&unit, &cells, 3));
+    INVALID(cells, mbm_unit_serveCallbacks(&unit, &cells, 3));
+    INVALID(unit, mbm_unit_serveCallbacks(&unit, &cells, 3));
     /* Without `serve`. */
     custom.code = 0x41;
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
+    INVALID(unit, mbm_unit_serveCustom(&unit, &custom));
     custom.serve = serve_nothing;
     custom.code = 128;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_serveCustom(&unit, &custom));
+    INVALID(custom, mbm_unit_serveCustom(&unit, &custom));
+    INVALID(unit, mbm_unit_serveCustom(&unit, &custom));
     custom.code = 0x41;
     custom.length.kind = 9;
-    REFUSED(MBM_INVALID_ARGUMENT, custom, mbm_unit_serveCustom(&unit, &custom));
-    REFUSED(MBM_INVALID_ARGUMENT, cells, mbm_unit_serveCallbacks(&unit, &cells, 3));
-    for (unsigned code = 0; code < 256; code++) {
-        if (code >= 1 && code <= 127)
-            continue;
-        REFUSED(MBM_INVALID_ARGUMENT, unit,
-                mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 0));
-        REFUSED(MBM_INVALID_ARGUMENT, mask,
-                mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 1));
+    INVALID(custom, mbm_unit_serveCustom(&unit, &custom));
+    for (unsigned code = 0; code < 256; code += code == 0 ? 128 : 1) {
+        INVALID(unit, mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 0));
+        INVALID(mask, mbm_unit_switchFunction(&unit, &mask, (uint8_t)code, 1));
     }
-    REFUSED(MBM_INVALID_ARGUMENT, unit, mbm_unit_switchFunction(&unit, NULL, 3, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, mask, mbm_unit_switchFunction(NULL, &mask, 3, 0));
-    memset(&other_table, 0, sizeof other_table);
+    INVALID(unit, mbm_unit_switchFunction(&unit, NULL, 3, 0));
+    INVALID(mask, mbm_unit_switchFunction(NULL, &mask, 3, 0));
+    /* A table that is not served, and one of input registers. */
     IS(MBM_INVALID_ARGUMENT, mbm_registerTable_serveMaskAndReadWrite(NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, other_table,
-            mbm_registerTable_serveMaskAndReadWrite(&other_table));
+    INVALID(other_table, mbm_registerTable_serveMaskAndReadWrite(&other_table));
     OK(mbm_unit_serveInputRegisters(&unit, &other_table));
-    REFUSED(MBM_INVALID_ARGUMENT, other_table,
-            mbm_registerTable_serveMaskAndReadWrite(&other_table));
+    INVALID(other_table, mbm_registerTable_serveMaskAndReadWrite(&other_table));
     OK(mbm_registerTable_serveMaskAndReadWrite(&table));
     /* A table is served as one kind; a unit has one diagnostics. */
     REFUSED(MBM_BUSY, table, mbm_unit_serveInputRegisters(&unit, &table));
@@ -250,15 +232,10 @@ TEST(hooks_are_set_and_removed)
     static mbm_dataCallbacks cells;
     static mbm_files files;
 
-    IS(MBM_INVALID_ARGUMENT, mbm_registerTable_setHooks(NULL, &hooks));
-    IS(MBM_INVALID_ARGUMENT, mbm_bitTable_setHooks(NULL, &hooks));
-    IS(MBM_INVALID_ARGUMENT, mbm_dataCallbacks_setHooks(NULL, &hooks));
-    IS(MBM_INVALID_ARGUMENT, mbm_files_setHooks(NULL, &hooks));
 #define SET(set, record)                                                                           \
-    do {                                                                                           \
-        OK(set(&record, &hooks));                                                                  \
-        OK(set(&record, NULL));                                                                    \
-    } while (0)
+    IS(MBM_INVALID_ARGUMENT, set(NULL, &hooks));                                                   \
+    OK(set(&record, &hooks));                                                                      \
+    OK(set(&record, NULL))
     SET(mbm_registerTable_setHooks, table);
     SET(mbm_bitTable_setHooks, bit_table);
     SET(mbm_dataCallbacks_setHooks, cells);
@@ -269,8 +246,6 @@ static mbm_fifos spare[MBM_MAX_SERVICES + 1];
 
 TEST(a_unit_has_as_many_records_as_the_header_says)
 {
-    static mbm_functionMask mask;
-
     /* One of them is the table of `setup`. */
     for (unsigned i = 1; i < MBM_MAX_SERVICES; i++)
         OK(mbm_unit_serveFifos(&unit, &spare[i]));
@@ -279,55 +254,49 @@ TEST(a_unit_has_as_many_records_as_the_header_says)
     REFUSED(MBM_BUFFER_TOO_SMALL, unit, mbm_unit_switchFunction(&unit, &mask, 3, 0));
 }
 
+/* Lets the unit respond to a read of one register, sent to `id`, with a damaged CRC or not. Returns
+ * how many bytes the response in `frame` has. */
+static uint16_t response_to_read(uint8_t id, uint8_t damage)
+{
+    uint16_t response = 9;
+
+    memcpy(frame, "\x11\x03\0\0\0\1", 6);
+    frame[0] = id;
+    seal(frame, 6);
+    frame[7] ^= damage;
+    OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), frame, 8, 260, &response));
+    return response;
+}
+
 TEST(a_function_that_is_off_is_illegal)
 {
-    static mbm_functionMask mask;
-    uint8_t request[260] = {17, 3, 0, 0, 0, 1};
-    uint16_t response;
-
-    memset(&mask, 0, sizeof mask);
     for (unsigned round = 0; round < 3; round++) {
-        memcpy(request, "\x11\x03\0\0\0\1", 6);
-        seal(request, 6);
-        OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), request, 8, 260, &response));
-        assert_int_equal(response, round == 1 ? 5 : 7);
-        assert_int_equal(request[1], round == 1 ? 0x83 : 3);
+        assert_int_equal(response_to_read(17, 0), round == 1 ? 5 : 7);
+        assert_int_equal(frame[1], round == 1 ? 0x83 : 3);
         if (round == 1)
-            assert_int_equal(request[2], MBM_ILLEGAL_FUNCTION);
+            assert_int_equal(frame[2], MBM_ILLEGAL_FUNCTION);
         OK(mbm_unit_switchFunction(&unit, &mask, 3, round == 1));
     }
 }
 
 TEST(a_response_has_no_bytes_where_no_device_answers)
 {
-    static const struct {
-        uint8_t unit, damage;
-    } rows[] = {{17, 1}, {18, 0}, {0, 0}};
-    uint8_t request[260];
     uint16_t response;
 
-    for (unsigned i = 0; i < COUNT(rows); i++) {
-        memcpy(request, "\x11\x03\0\0\0\1", 6);
-        request[0] = rows[i].unit;
-        seal(request, 6);
-        request[7] ^= rows[i].damage;
-        response = 9;
-        OK(mbm_unit_respond(&unit, 1, NULL, FRAMING(MBM_FRAMING_RTU), request, 8, 260, &response));
-        assert_int_equal(response, 0);
-    }
-    response = 9;
-#define NO_RESPONSE(call)                                                                          \
-    do {                                                                                           \
-        response = 9;                                                                              \
-        IS(MBM_INVALID_ARGUMENT, call);                                                            \
-        assert_int_equal(response, 0);                                                             \
-    } while (0)
-    NO_RESPONSE(mbm_unit_respond(NULL, 1, NULL, FRAMING(0), request, 8, 260, &response));
-    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, NULL, request, 8, 260, &response));
-    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), NULL, 8, 260, &response));
-    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 261, 260, &response));
-    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(9), request, 8, 260, &response));
-    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 8, 260, NULL));
+    assert_int_equal(response_to_read(17, 1), 0);
+    assert_int_equal(response_to_read(18, 0), 0);
+    assert_int_equal(response_to_read(0, 0), 0);
+#define NO_RESPONSE(units, framing, frame, length)                                                 \
+    response = 9;                                                                                  \
+    IS(MBM_INVALID_ARGUMENT,                                                                       \
+       mbm_unit_respond(units, 1, NULL, framing, frame, length, 260, &response));                  \
+    assert_int_equal(response, 0)
+    NO_RESPONSE(NULL, FRAMING(0), frame, 8);
+    NO_RESPONSE(&unit, NULL, frame, 8);
+    NO_RESPONSE(&unit, FRAMING(0), NULL, 8);
+    NO_RESPONSE(&unit, FRAMING(0), frame, 261);
+    NO_RESPONSE(&unit, FRAMING(9), frame, 8);
+    IS(MBM_INVALID_ARGUMENT, mbm_unit_respond(&unit, 1, NULL, FRAMING(0), frame, 8, 260, NULL));
     unit.id = 300;
-    NO_RESPONSE(mbm_unit_respond(&unit, 1, NULL, FRAMING(0), request, 8, 260, &response));
+    NO_RESPONSE(&unit, FRAMING(0), frame, 8);
 }

@@ -46,25 +46,18 @@ static void all_begins_are_refused(uint8_t *frame)
 
     without_read.read = NULL;
     memset(&other, 0, sizeof other);
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtu(&server, &without_read, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, NULL, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server, mbm_server_beginRtu(&server, &port, &other, 1, NULL, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtu(&server, &port, &other, 1, frame, 15));
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginAscii(&server, &port, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginTcp(&server, &port, &other, 1, frame, 20));
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 15));
+    INVALID(server, mbm_server_beginRtu(&server, &without_read, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtu(&server, NULL, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtu(&server, &port, NULL, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtu(&server, &port, &other, 1, NULL, 20));
+    INVALID(server, mbm_server_beginRtu(&server, &port, &other, 1, frame, 15));
+    INVALID(server, mbm_server_beginAscii(&server, &port, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginTcp(&server, &port, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 15));
     other.id = 300; /* not 44 */
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtu(&server, &port, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtu(&server, &port, &other, 1, frame, 20));
     other.id = 256; /* not a unit for every id */
-    REFUSED(MBM_INVALID_ARGUMENT, server,
-            mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 20));
+    INVALID(server, mbm_server_beginRtuOverTcp(&server, &port, &other, 1, frame, 20));
 }
 
 static void poll_for_a_while(void)
@@ -138,22 +131,22 @@ TEST(a_master_goes_on_after_refused_calls)
 
     memset(&line, 0, sizeof line);
     memset(&m, 0, sizeof m);
-    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, NULL, small, 8));
+    INVALID(line, mbm_line_beginRtu(&line, NULL, small, 8));
     mute.write = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &mute, small, 8));
-    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &port, small, 7));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_begin(&m, NULL, 17, one, 1, one, 1));
+    INVALID(line, mbm_line_beginRtu(&line, &mute, small, 8));
+    INVALID(line, mbm_line_beginRtu(&line, &port, small, 7));
+    INVALID(m, mbm_node_begin(&m, NULL, 17, one, 1, one, 1));
     OK(mbm_line_beginRtu(&line, &port, frame, MBM_MAX_FRAME));
     OK(mbm_node_begin(&m, &line, 17, response, 125, transmit, 2));
     OK(mbm_node_setBlocking(&m, 0));
     transmit[0] = transmit[1] = 0x1234;
     IS(MBM_PENDING, mbm_node_readHoldingRegisters(&m, 0, 125));
 
-    REFUSED(MBM_INVALID_ARGUMENT, line, mbm_line_beginRtu(&line, &mute, small, 8));
+    INVALID(line, mbm_line_beginRtu(&line, &mute, small, 8));
     REFUSED(MBM_BUSY, line, mbm_line_beginRtu(&line, &port, small, 8));
     REFUSED(MBM_BUSY, line, mbm_line_setFrame(&line, small, 8));
     REFUSED(MBM_BUSY, m, mbm_node_begin(&m, &line, 17, one, 1, one, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, m, mbm_node_begin(&m, &line, 17, one, 256, one, 1));
+    INVALID(m, mbm_node_begin(&m, &line, 17, one, 256, one, 1));
     UNCHANGED(m, every_node_request_returns(MBM_BUSY, &m));
     assert_int_equal(transmit[0], 0x1234);
     assert_int_equal(transmit[1], 0x1234);
@@ -190,11 +183,11 @@ TEST(a_sniffer_goes_on_after_refused_calls)
     hooked_port_arrive_rtu(&wire, 17, "\3\0\0\0\1", 5);
     assert_int_equal(mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, wire.arriving, 4, 0), 4);
     REFUSED(MBM_BUFFER_TOO_SMALL, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, small, 31));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, NULL, 256));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setDelimiter(&sniffer, '\r'));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setResponseTimeout(&sniffer, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, sniffer, mbm_sniffer_setFrameTimeout(&sniffer, 0));
+    INVALID(sniffer, mbm_sniffer_begin(&sniffer, MBM_FRAMING_RTU, NULL, 256));
+    INVALID(sniffer, mbm_sniffer_setFunctions(&sniffer, NULL, 1));
+    INVALID(sniffer, mbm_sniffer_setDelimiter(&sniffer, '\r'));
+    INVALID(sniffer, mbm_sniffer_setResponseTimeout(&sniffer, 0));
+    INVALID(sniffer, mbm_sniffer_setFrameTimeout(&sniffer, 0));
     REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, 3, wire.arriving, 4, 0));
     REFUSED(0, sniffer, mbm_sniffer_feed(&sniffer, MBM_DIRECTION_BOTH, NULL, 4, 0));
     REFUSED(0, sniffer, mbm_sniffer_next(&sniffer, 0, NULL));
@@ -318,26 +311,25 @@ TEST(a_zeroed_client_stays_zero_when_a_begin_is_refused)
     all_client_begins_are(MBM_INVALID_ARGUMENT, NULL, small, 16);
     all_client_begins_are(MBM_INVALID_ARGUMENT, &port, NULL, 16);
     all_client_begins_are(MBM_INVALID_ARGUMENT, &port, small, 7);
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_beginTcp(&client, &port, small, 8, small, 12));
-    REFUSED(MBM_INVALID_ARGUMENT, client,
-            mbm_client_beginTcp(&client, &port, small, 16, small, 11));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_beginTcp(&client, &port, small, 16, NULL, 12));
+    INVALID(client, mbm_client_beginTcp(&client, &port, small, 8, small, 12));
+    INVALID(client, mbm_client_beginTcp(&client, &port, small, 16, small, 11));
+    INVALID(client, mbm_client_beginTcp(&client, &port, small, 16, NULL, 12));
     assert_int_equal(mbm_client_pending(&client), 0);
     REFUSED(MBM_NOT_INITIALISED, client, mbm_client_setRetries(&client, 1));
 }
 
 static void all_settings_out_of_range_are_refused(int framing)
 {
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setBackoff(&client, 4, 1, 1));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setJitter(&client, 101, NULL, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setJitter(&client, 1, NULL, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setInFlight(&client, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setInFlight(&client, 17));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, ':'));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, 0));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
+    INVALID(client, mbm_client_setBackoff(&client, 4, 1, 1));
+    INVALID(client, mbm_client_setJitter(&client, 101, NULL, NULL));
+    INVALID(client, mbm_client_setJitter(&client, 1, NULL, NULL));
+    INVALID(client, mbm_client_setInFlight(&client, 0));
+    INVALID(client, mbm_client_setInFlight(&client, 17));
+    INVALID(client, mbm_client_setDelimiter(&client, ':'));
+    INVALID(client, mbm_client_setDelimiter(&client, 0));
+    INVALID(client, mbm_client_resume(&client, NULL));
     if (framing != 1)
-        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_setDelimiter(&client, '!'));
+        INVALID(client, mbm_client_setDelimiter(&client, '!'));
 }
 
 TEST(a_client_goes_on_after_refused_calls)
@@ -371,10 +363,10 @@ TEST(a_client_goes_on_after_refused_calls)
         if (framing == 1)
             REFUSED(MBM_BUSY, client, mbm_client_setDelimiter(&client, '!'));
         REFUSED(MBM_NOT_PENDING, client, mbm_client_cancel(&client, &other));
-        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_cancel(&client, NULL));
+        INVALID(client, mbm_client_cancel(&client, NULL));
         REFUSED(MBM_BUSY, client, mbm_client_readCoils(&client, &request, 0, 1));
         REFUSED(MBM_BUSY, request, mbm_client_readCoils(&client, &request, 0, 1));
-        REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_readCoils(&client, NULL, 0, 1));
+        INVALID(client, mbm_client_readCoils(&client, NULL, 0, 1));
         REFUSED(MBM_BUSY, client, mbm_client_suspend(&client, NULL));
         REFUSED(framing == 0 || framing == 3 ? MBM_BUSY : MBM_INVALID_ARGUMENT, client,
                 mbm_client_suspend(&client, &line));
@@ -386,8 +378,7 @@ TEST(a_client_goes_on_after_refused_calls)
         other.replyBytes = 1;
         REFUSED(MBM_ILLEGAL_DATA_VALUE, client, mbm_client_readCoils(&client, &other, 0, 0));
         REFUSED(MBM_BUFFER_TOO_SMALL, client, mbm_client_readCoils(&client, &other, 0, 9));
-        REFUSED(MBM_INVALID_ARGUMENT, client,
-                mbm_client_writeMultipleRegisters(&client, &other, 0, 1));
+        INVALID(client, mbm_client_writeMultipleRegisters(&client, &other, 0, 1));
         IS(MBM_INVALID_ARGUMENT, other.status);
         if (framing == 2)
             REFUSED(MBM_DUPLICATE_TRANSACTION, client, mbm_client_readCoils(&client, &other, 0, 1));
@@ -439,7 +430,7 @@ TEST(a_full_queue_and_a_suspended_client_change_nothing)
     REFUSED(MBM_BUSY, client, mbm_client_poll(&client));
     REFUSED(MBM_BUSY, client, mbm_client_reconnect(&client, NULL));
     OK(mbm_client_resume(&client, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, client, mbm_client_resume(&client, NULL));
+    INVALID(client, mbm_client_resume(&client, NULL));
     /* While a master has a pending request, it can be neither given the line nor lose it. */
     OK(mbm_line_setFrame(&line, line_frame, 16));
     OK(mbm_node_begin(&node, &line, 1, node_words, 2, node_words, 0));

@@ -297,23 +297,20 @@ TEST(a_trace_goes_on_after_refused_calls)
     const mbm_port *traced = mbm_trace_port(&trace);
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 4);
     for (size_t i = 0; i < COUNT(framings); i++)
-        REFUSED(MBM_INVALID_ARGUMENT, trace,
-                mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, framings[i], buffer, 64, keep,
-                                NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, NULL, &rtu, buffer, 64, keep, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace,
+        INVALID(trace, mbm_trace_begin(&trace, MBM_PACKET_RESPONSE, &port, framings[i], buffer, 64,
+                                       keep, NULL));
+    INVALID(trace, mbm_trace_begin(&trace, MBM_PACKET_REQUEST, NULL, &rtu, buffer, 64, keep, NULL));
+    INVALID(trace,
             mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &incomplete, &rtu, buffer, 64, keep, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace,
+    INVALID(trace,
             mbm_trace_begin(&trace, MBM_PACKET_REQUEST, traced, &rtu, buffer, 64, keep, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace,
-            mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, NULL, 64, keep, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace,
+    INVALID(trace, mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, NULL, 64, keep, NULL));
+    INVALID(trace,
             mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer, 64, NULL, NULL));
     REFUSED(MBM_BUFFER_TOO_SMALL, trace,
             mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &port, &rtu, buffer,
                             MBM_MIN_TRACE_BUFFER - 1, keep, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, trace, mbm_trace_setFrameTimeout(&trace, 0));
+    INVALID(trace, mbm_trace_setFrameTimeout(&trace, 0));
     wire.last = sizeof REPLY + 2;
     assert_int_equal(traced->read(traced->context, bytes, sizeof bytes), 5);
     assert_int_equal(count, 1);
@@ -420,7 +417,7 @@ TEST(an_event_of_a_sniffer_becomes_a_record)
             memset(&record, 0x55, sizeof record);
             if (event.kind == MBM_EVENT_TIMEOUT) {
                 timeouts++;
-                REFUSED(MBM_INVALID_ARGUMENT, record, mbm_trace_ofEvent(&event, &record));
+                INVALID(record, mbm_trace_ofEvent(&event, &record));
                 continue;
             }
             OK(mbm_trace_ofEvent(&event, &record));

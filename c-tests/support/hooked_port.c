@@ -90,6 +90,19 @@ mbm_port hooked_port_of(hooked_port *p)
     return port;
 }
 
+mbm_port hooked_port_without(hooked_port *p, int hook)
+{
+    mbm_port port = hooked_port_of(p);
+
+    if (hook == HOOK_READ)
+        port.read = NULL;
+    else if (hook == HOOK_WRITE)
+        port.write = NULL;
+    else
+        port.micros = NULL;
+    return port;
+}
+
 void hooked_port_arrive(hooked_port *p, const void *bytes, size_t length)
 {
     memcpy(p->arriving, bytes, length);

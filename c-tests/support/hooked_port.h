@@ -23,6 +23,9 @@ typedef struct hooked_port {
 /* A port over `p` with all hooks. `p` must stay where it is. */
 mbm_port hooked_port_of(hooked_port *p);
 
+/* The same without a hook that mbm needs: HOOK_READ, HOOK_WRITE or HOOK_MICROS. */
+mbm_port hooked_port_without(hooked_port *p, int hook);
+
 /* Replaces the bytes that are still to arrive. */
 void hooked_port_arrive(hooked_port *p, const void *bytes, size_t length);
 

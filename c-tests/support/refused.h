@@ -19,6 +19,15 @@
         assert_memory_equal(before, &(object), sizeof(object));                                    \
     } while (0)
 
+#define INVALID(object, call) REFUSED(MBM_INVALID_ARGUMENT, object, call)
+
+/* Asserts that a setting of an object accepts `most` and refuses the next value. */
+#define RANGE(object, most, set)                                                                   \
+    do {                                                                                           \
+        OK(set(&(object), most));                                                                  \
+        INVALID(object, set(&(object), (most) + 1));                                               \
+    } while (0)
+
 static uint8_t before[32768];
 
 #endif
