@@ -143,4 +143,11 @@ void sim_node(sim *s, uint8_t unit);
     static void with_##name(__attribute__((unused)) sim *s, __attribute__((unused)) mbm_node *n)
 #define SIM_TEST(name) SIM_TEST_WITH(name, (void))
 
+/* A test that is one call with `s` and `n`, as a row of a table of tests. */
+#define SIM_ROW(name, call)                                                                        \
+    SIM_TEST(name)                                                                                 \
+    {                                                                                              \
+        call;                                                                                      \
+    }
+
 #endif
