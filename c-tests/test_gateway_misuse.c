@@ -54,10 +54,8 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
     ON_LINE(0, 2, READ);
     INVALID(b.gateway, mbm_gateway_begin(&b.gateway, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_gateway_begin(NULL, &b.config));
-#define REFUSES(status, field, value)                                                              \
-    config = b.config;                                                                             \
-    config.field = value;                                                                          \
-    refuses_config(status, config)
+    config = b.config;
+#define REFUSES(status, field, value) WITH(config.field, value, refuses_config(status, config))
     REFUSES(MBM_INVALID_ARGUMENT, routes, NULL);
     REFUSES(MBM_INVALID_ARGUMENT, lines, NULL);
     REFUSES(MBM_INVALID_ARGUMENT, connections, NULL);
@@ -68,14 +66,11 @@ TEST(a_gateway_goes_on_after_a_refused_begin)
     REFUSES(MBM_INVALID_ARGUMENT, requestCount, 65535);
     REFUSES(MBM_INVALID_ARGUMENT, lineCount, 254);
     REFUSES(MBM_INVALID_ARGUMENT, lineCount, 1); /* a route leads to line 1 */
-    for (unsigned i = 0; i < COUNT(bad); i++) {
-        config = b.config;
-        config.routeCount = 1;
+    config.routeCount = 1;
+    for (unsigned i = 0; i < COUNT(bad); i++)
         REFUSES(MBM_INVALID_ARGUMENT, routes, &bad[i]);
-    }
-    config = b.config;
     config.lines = &line;
-    config.lineCount = config.routeCount = 1;
+    config.lineCount = 1;
     refuses_config(MBM_INVALID_ARGUMENT, config); /* no client */
     line.client = &none;
     refuses_config(MBM_NOT_INITIALISED, config);
@@ -256,16 +251,12 @@ TEST(hooks_of_a_connection_cannot_use_the_gateway)
 
 TEST(hooks_of_a_line_cannot_use_the_gateway)
 {
-    const mbm_port port = hooked(&b.wires[0]);
+    mbm_port port = hooked(&b.wires[0]);
 
     /* The clock of the new port is read at once, in begin, when nothing may be refused. */
     memset(&b.clients[0], 0, sizeof b.clients[0]);
-    {
-        mbm_port begun = port;
-
-        begun.micros = inner.micros;
-        OK(mbm_client_beginRtu(&b.clients[0], &begun, b.frames[0], MBM_MAX_FRAME));
-    }
+    WITH(port.micros, inner.micros,
+         OK(mbm_client_beginRtu(&b.clients[0], &port, b.frames[0], MBM_MAX_FRAME)));
     b.lines[0].isReady = is_ready;
     entered = 0;
     exchange();

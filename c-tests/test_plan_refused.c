@@ -17,75 +17,43 @@ TEST(a_wrong_field_is_named)
 {
     add(MBM_TYPE_UINT16, 0);
     mbm_planField *field = add(MBM_TYPE_UINT32, 20);
-    field->type = 99;
-    refuses(MBM_INVALID_ARGUMENT, 1);
-    field->type = MBM_TYPE_UINT32;
-    field->table = 5;
-    refuses(MBM_INVALID_ARGUMENT, 1);
-    field->table = HOLDING;
-    field->address = 0xFFFF;
-    refuses(MBM_ILLEGAL_DATA_ADDRESS, 1);
-    field->address = 20;
-    field->unit = 0;
-    refuses(MBM_BROADCAST_NOT_ALLOWED, 1);
-    field->unit = 300; /* not 44 */
-    refuses(MBM_INVALID_ARGUMENT, 1);
-    field->unit = 256; /* not a broadcast */
-    refuses(MBM_INVALID_ARGUMENT, 1);
-    field->unit = 1;
-    field->count = 63;
-    refuses(MBM_ILLEGAL_DATA_VALUE, 1);
-    field->count = 1;
-    field->bit = 1; /* of a number */
-    refuses(MBM_INVALID_ARGUMENT, 1);
+#define WRONG(status, member, value) WITH(member, value, refuses(status, 1))
+    WRONG(MBM_INVALID_ARGUMENT, field->type, 99);
+    WRONG(MBM_INVALID_ARGUMENT, field->table, 5);
+    WRONG(MBM_ILLEGAL_DATA_ADDRESS, field->address, 0xFFFF);
+    WRONG(MBM_BROADCAST_NOT_ALLOWED, field->unit, 0);
+    WRONG(MBM_INVALID_ARGUMENT, field->unit, 300); /* not 44 */
+    WRONG(MBM_INVALID_ARGUMENT, field->unit, 256); /* not a broadcast */
+    WRONG(MBM_ILLEGAL_DATA_VALUE, field->count, 63);
+    WRONG(MBM_INVALID_ARGUMENT, field->bit, 1); /* of a number */
     field->type = MBM_TYPE_BIT;
-    field->bit = 16;
-    refuses(MBM_INVALID_ARGUMENT, 1);
+    WRONG(MBM_INVALID_ARGUMENT, field->bit, 16);
     field->bit = 9;
-    field->count = 8;
-    refuses(MBM_INVALID_ARGUMENT, 1);
-    *field = (mbm_planField){.unit = 1,
-                             .table = HOLDING,
-                             .type = MBM_TYPE_UINT32,
-                             .address = 20,
-                             .intervalMs = field->intervalMs};
-    d.setup.readCount = 1;
-    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    WRONG(MBM_INVALID_ARGUMENT, field->count, 8);
+    field->bit = 0;
+    field->type = MBM_TYPE_UINT32;
+    WRONG(MBM_BUFFER_TOO_SMALL, d.setup.readCount, 1);
     d.setup.readCount = 2;
-    d.setup.dataWords = 2;
-    refuses(MBM_BUFFER_TOO_SMALL, 1);
+    WRONG(MBM_BUFFER_TOO_SMALL, d.setup.dataWords, 2);
     d.setup.dataWords = 3;
     plan_device_start(&d);
 }
 
 TEST(a_setup_that_is_not_complete_is_refused)
 {
-    const mbm_planSetup whole = d.setup;
-
     add(MBM_TYPE_UINT16, 0);
-    for (unsigned i = 0; i < 12; i++) {
-        uint16_t count = d.setup.fieldCount;
-
-        d.setup = whole;
-        d.setup.fieldCount = count;
-        switch (i) {
-        case 0: d.setup.fields = NULL; break;
-        case 1: d.setup.positions = NULL; break;
-        case 2: d.setup.reads = NULL; break;
-        case 3: d.setup.data = NULL; break;
-        case 4: d.setup.requests = NULL; break;
-        case 5: d.setup.requestCount = 0; break;
-        case 6: d.setup.requestCount = 17; break;
-        case 7: d.setup.unitCount = 1; break;
-        case 8: d.setup.excludedCount = 1; break;
-        case 9: d.setup.fieldCount = 0; break;
-        case 10: d.setup.fieldCount = MBM_PLAN_MAX_FIELDS + 1; break;
-        default: break;
-        }
-        if (i < 11)
-            refuses(MBM_INVALID_ARGUMENT, 0xFFFF);
-        d.setup.fieldCount = count;
-    }
+#define WITHOUT(member, value) WITH(d.setup.member, value, refuses(MBM_INVALID_ARGUMENT, 0xFFFF))
+    WITHOUT(fields, NULL);
+    WITHOUT(positions, NULL);
+    WITHOUT(reads, NULL);
+    WITHOUT(data, NULL);
+    WITHOUT(requests, NULL);
+    WITHOUT(requestCount, 0);
+    WITHOUT(requestCount, 17);
+    WITHOUT(unitCount, 1);
+    WITHOUT(excludedCount, 1);
+    WITHOUT(fieldCount, 0);
+    WITHOUT(fieldCount, MBM_PLAN_MAX_FIELDS + 1);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(NULL, &d.client, &d.setup, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, NULL, &d.setup, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
@@ -127,9 +95,7 @@ TEST(a_plan_that_begins_again_gives_its_requests_up)
     OK(mbm_plan_poll(&d.plan));
     assert_int_equal(mbm_client_pending(&d.client), 1);
     /* A setup that is not complete is refused before anything is given up. */
-    d.setup.requestCount = 0;
-    INVALID(d.plan, plan_device_try(&d, NULL));
-    d.setup.requestCount = 1;
+    WITH(d.setup.requestCount, 0, INVALID(d.plan, plan_device_try(&d, NULL)));
     INVALID(d.plan, mbm_plan_begin(&d.plan, &d.client, NULL, NULL));
     INVALID(d.plan, mbm_plan_begin(&d.plan, NULL, &d.setup, NULL));
     assert_int_equal(mbm_client_pending(&d.client), 1);
@@ -190,24 +156,17 @@ TEST(a_table_that_is_not_grouped_as_the_counts_say_is_refused)
     add(MBM_TYPE_UINT16, 20);
     add(MBM_TYPE_UINT16, 145);
     d.setup.readCount = 2;
-#define TRY(counts) mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, (counts), &field)
-    INVALID(d.plan, TRY(counts));
-    assert_int_equal(field, 2); /* 126 registers */
-    d.fields[2].address = 19;
-    INVALID(d.plan, TRY(counts));
-    assert_int_equal(field, 2);
+#define TRY(status, wrong)                                                                         \
+    REFUSED(status, d.plan, mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, &field));  \
+    assert_int_equal(field, wrong)
+    TRY(MBM_INVALID_ARGUMENT, 2); /* 126 registers */
+    WITH(d.fields[2].address, 19, TRY(MBM_INVALID_ARGUMENT, 2));
     d.fields[2].address = 144;
-    d.setup.readCount = 1;
-    INVALID(d.plan, TRY(counts));
-    assert_int_equal(field, 0xFFFF);
-    d.setup.readCount = 2;
-    d.setup.dataWords = 125;
-    REFUSED(MBM_BUFFER_TOO_SMALL, d.plan, TRY(counts));
-    assert_int_equal(field, 1);
+    WITH(d.setup.readCount, 1, TRY(MBM_INVALID_ARGUMENT, 0xFFFF));
+    WITH(d.setup.dataWords, 125, TRY(MBM_BUFFER_TOO_SMALL, 1));
     d.setup.dataWords = 126;
-    OK(TRY(counts));
+    OK(mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, &field));
     assert_int_equal(field, 0xFFFF);
-#undef TRY
 }
 
 TEST(a_wrong_field_of_a_grouped_table_is_named)
@@ -219,28 +178,14 @@ TEST(a_wrong_field_of_a_grouped_table_is_named)
     add(MBM_TYPE_UINT16, 20);
     mbm_planField *last = add(MBM_TYPE_UINT16, 21);
     d.setup.readCount = 2;
-#define NAMES(status)                                                                              \
-    do {                                                                                           \
-        REFUSED(status, d.plan,                                                                    \
-                mbm_plan_beginGrouped(&d.plan, &d.client, &d.setup, counts, &field));              \
-        assert_int_equal(field, 2);                                                                \
-    } while (0)
-    last->unit = 0;
-    NAMES(MBM_BROADCAST_NOT_ALLOWED);
-    last->unit = 257; /* not 1 */
-    NAMES(MBM_INVALID_ARGUMENT);
-    last->unit = 2;
-    NAMES(MBM_INVALID_ARGUMENT);
-    last->unit = 1;
-    last->table = 5;
-    NAMES(MBM_INVALID_ARGUMENT);
-    last->table = HOLDING;
-    last->type = 99;
-    NAMES(MBM_INVALID_ARGUMENT);
+#define NAMES(status, member, value) WITH(last->member, value, TRY(status, 2))
+    NAMES(MBM_BROADCAST_NOT_ALLOWED, unit, 0);
+    NAMES(MBM_INVALID_ARGUMENT, unit, 257); /* not 1 */
+    NAMES(MBM_INVALID_ARGUMENT, unit, 2);
+    NAMES(MBM_INVALID_ARGUMENT, table, 5);
+    NAMES(MBM_INVALID_ARGUMENT, type, 99);
     last->type = MBM_TYPE_UINT32;
-    last->address = 0xFFFF;
-    NAMES(MBM_ILLEGAL_DATA_ADDRESS);
-#undef NAMES
+    NAMES(MBM_ILLEGAL_DATA_ADDRESS, address, 0xFFFF);
 }
 
 /* Each function of the plan is held to its comment in mbm.h: results, limits, NULL.
@@ -363,21 +308,21 @@ TEST_WITH(a_field_that_does_not_exist_is_refused, start, NULL)
 TEST_WITH(a_plan_that_was_never_begun_refuses_every_call, start, NULL)
 {
     static const uint16_t count = 1;
+    mbm_plan *const plans[] = {NULL, &none};
     uint16_t blocks[PLAN_FIELDS];
     mbm_planSplitting splitting = {.blocks = blocks}, no_blocks = MBM_INIT;
 
-    every_call_returns(MBM_INVALID_ARGUMENT, NULL, 0);
-    every_call_returns(MBM_NOT_INITIALISED, &none, 0);
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_poll(NULL));
-    IS(MBM_NOT_INITIALISED, mbm_plan_poll(&none));
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(NULL, &splitting));
+    for (unsigned i = 0; i < COUNT(plans); i++) {
+        const uint8_t status = i == 0 ? MBM_INVALID_ARGUMENT : MBM_NOT_INITIALISED;
+
+        every_call_returns(status, plans[i], 0);
+        IS(status, mbm_plan_poll(plans[i]));
+        IS(status, mbm_plan_pollSplitting(plans[i], &splitting));
+        IS(status, mbm_plan_end(plans[i]));
+        assert_int_equal(mbm_plan_pollDelay(plans[i]), UINT32_MAX);
+    }
     IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(&d.plan, NULL));
     IS(MBM_INVALID_ARGUMENT, mbm_plan_pollSplitting(&d.plan, &no_blocks));
-    IS(MBM_NOT_INITIALISED, mbm_plan_pollSplitting(&none, &splitting));
-    IS(MBM_INVALID_ARGUMENT, mbm_plan_end(NULL));
-    IS(MBM_NOT_INITIALISED, mbm_plan_end(&none));
-    assert_int_equal(mbm_plan_pollDelay(NULL), UINT32_MAX);
-    assert_int_equal(mbm_plan_pollDelay(&none), UINT32_MAX);
     IS(MBM_INVALID_ARGUMENT, mbm_plan_begin(NULL, &d.client, &d.setup, NULL));
     INVALID(none, mbm_plan_begin(&none, NULL, &d.setup, NULL));
     INVALID(none, mbm_plan_begin(&none, &d.client, NULL, NULL));

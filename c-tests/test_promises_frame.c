@@ -503,13 +503,7 @@ TEST(packets_without_records_or_objects_have_none)
 #define ADDS(status, what, storage, bytes, added)                                                  \
     REFUSED(status, packet, mbm_packet_add##what(&packet, storage, bytes, added))
 #define ADDS_WITH(field, value, status, what)                                                      \
-    do {                                                                                           \
-        const __typeof__(field) kept = field;                                                      \
-                                                                                                   \
-        field = value;                                                                             \
-        ADDS(status, what, storage, sizeof storage, &added);                                       \
-        field = kept;                                                                              \
-    } while (0)
+    WITH(field, value, ADDS(status, what, storage, sizeof storage, &added))
 
 TEST(records_are_added_within_their_limits)
 {

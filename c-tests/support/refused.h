@@ -21,6 +21,16 @@
 
 #define INVALID(object, call) REFUSED(MBM_INVALID_ARGUMENT, object, call)
 
+/* Makes calls while a variable has another value. */
+#define WITH(variable, value, calls)                                                               \
+    do {                                                                                           \
+        const __typeof__(variable) kept = (variable);                                              \
+                                                                                                   \
+        (variable) = (value);                                                                      \
+        calls;                                                                                     \
+        (variable) = kept;                                                                         \
+    } while (0)
+
 /* Asserts that a setting of an object accepts `most` and refuses the next value. */
 #define RANGE(object, most, set)                                                                   \
     do {                                                                                           \
