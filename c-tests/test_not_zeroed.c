@@ -1,6 +1,7 @@
 /* Objects in memory that was not zeroed: with MBM_INIT every object works; without it a begin
  * function works too, or returns a status. The exception is memory with the mark of an object that
  * was begun, one byte. */
+#include "every_call.h"
 #include "hooked_port.h"
 #include "mbm.h"
 #include "plan_device.h"
@@ -45,111 +46,72 @@ static uint8_t use_line_and_node(mbm_line *line, mbm_node *node)
     return MBM_OK;
 }
 
-static uint8_t use_line(void *object)
+static uint8_t use_line(void *object, unsigned framing)
 {
     mbm_node node = MBM_INIT;
 
     return use_line_and_node(object, &node);
 }
 
-static uint8_t use_node(void *object)
+static uint8_t use_node(void *object, unsigned framing)
 {
     mbm_line line = MBM_INIT;
 
     return use_line_and_node(&line, object);
 }
 
-static uint8_t use_client(mbm_client *client, uint8_t begun, int is_rtu)
+static uint8_t use_client(void *object, unsigned framing)
 {
     mbm_clientRequest request = MBM_INIT;
+    const uint8_t begun = CLIENT_BEGIN(object, framing, &port, frame, outgoing);
 
     if (begun != MBM_OK)
         return begun;
     request.unit = 17;
     request.reply = words;
     request.replyBytes = sizeof words;
-    IS(MBM_PENDING, mbm_client_readHoldingRegisters(client, &request, 0, 1));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(object, &request, 0, 1));
     for (unsigned i = 0; i < 1000 && wire.length == 0; i++)
-        IS(MBM_PENDING, mbm_client_poll(client));
+        IS(MBM_PENDING, mbm_client_poll(object));
     assert_true(wire.length > 0);
-    if (is_rtu) {
+    if (framing == MBM_FRAMING_RTU || framing == MBM_FRAMING_RTU_OVER_TCP) {
         hooked_port_arrive_rtu(&wire, 17, "\x03\x02\x12\x34", 4);
         for (unsigned i = 0; i < 1000 && request.status == MBM_PENDING; i++)
-            mbm_client_poll(client);
+            mbm_client_poll(object);
         OK(request.status);
         assert_int_equal(words[0], 0x1234);
     } else {
-        OK(mbm_client_cancel(client, &request));
+        OK(mbm_client_cancel(object, &request));
     }
     return MBM_OK;
 }
 
-static uint8_t use_rtu_client(void *object)
+static uint8_t use_server(void *object, unsigned framing)
 {
-    return use_client(object, mbm_client_beginRtu(object, &port, frame, sizeof frame), 1);
-}
-
-static uint8_t use_ascii_client(void *object)
-{
-    return use_client(object, mbm_client_beginAscii(object, &port, frame, sizeof frame), 0);
-}
-
-static uint8_t use_tcp_client(void *object)
-{
-    return use_client(
-        object, mbm_client_beginTcp(object, &port, frame, sizeof frame, outgoing, sizeof outgoing),
-        0);
-}
-
-static uint8_t use_stream_client(void *object)
-{
-    return use_client(object, mbm_client_beginRtuOverTcp(object, &port, frame, sizeof frame), 1);
-}
-
-typedef uint8_t begin_server(mbm_server *, const mbm_port *, mbm_unit *, uint8_t, uint8_t *,
-                             uint16_t);
-
-static uint8_t use_server(mbm_server *server, begin_server *begin, const char *request,
-                          size_t length, size_t expected)
-{
+    /* By framing: a request, and the length of its response. */
+    static const struct {
+        const char *request;
+        size_t length, response;
+    } rows[] = {{"\x11\x03\x00\x00\x00\x01\x86\x9A", 8, 7},
+                {":110300000001EB\r\n", 17, 15},
+                {"\0\1\0\0\0\6\x11\x03\0\0\0\1", 12, 11},
+                {"\x11\x03\x00\x00\x00\x01\x86\x9A", 8, 7}};
     mbm_unit unit = MBM_INIT;
     mbm_registerTable table = MBM_INIT;
+    uint8_t begun;
 
     unit.id = 17;
     table.words = words;
     table.size = 4;
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    uint8_t begun = begin(server, &port, &unit, 1, frame, sizeof frame);
+    begun = server_begin(object, framing, &port, &unit, 1, frame, sizeof frame);
     if (begun != MBM_OK)
         return begun;
-    if (length == 5)
-        hooked_port_arrive_rtu(&wire, 17, request, length);
-    else
-        hooked_port_arrive(&wire, request, length);
+    hooked_port_arrive(&wire, rows[framing].request, rows[framing].length);
     for (unsigned i = 0; i < 100; i++)
-        OK(mbm_server_poll(server));
-    assert_int_equal(wire.length, expected);
+        OK(mbm_server_poll(object));
+    assert_int_equal(wire.length, rows[framing].response);
     return MBM_OK;
-}
-
-static uint8_t use_rtu_server(void *object)
-{
-    return use_server(object, mbm_server_beginRtu, "\x03\x00\x00\x00\x01", 5, 7);
-}
-
-static uint8_t use_ascii_server(void *object)
-{
-    return use_server(object, mbm_server_beginAscii, ":110300000001EB\r\n", 17, 15);
-}
-
-static uint8_t use_tcp_server(void *object)
-{
-    return use_server(object, mbm_server_beginTcp, "\0\1\0\0\0\6\x11\x03\0\0\0\1", 12, 11);
-}
-
-static uint8_t use_stream_server(void *object)
-{
-    return use_server(object, mbm_server_beginRtuOverTcp, "\x03\x00\x00\x00\x01", 5, 7);
 }
 
 static uint8_t connected(void *context)
@@ -158,7 +120,7 @@ static uint8_t connected(void *context)
     return MBM_OK;
 }
 
-static uint8_t use_link(void *object)
+static uint8_t use_link(void *object, unsigned framing)
 {
     static mbm_client client;
     unsigned connects = 0;
@@ -176,7 +138,7 @@ static uint8_t use_link(void *object)
     return MBM_OK;
 }
 
-static uint8_t use_plan(void *object)
+static uint8_t use_plan(void *object, unsigned framing)
 {
     static plan_device device;
     uint32_t ageMs;
@@ -197,7 +159,7 @@ static uint8_t use_plan(void *object)
     return MBM_OK;
 }
 
-static uint8_t use_gateway(void *object)
+static uint8_t use_gateway(void *object, unsigned framing)
 {
     static mbm_client client;
     mbm_gatewayRoute route = {0, 255, 0, 0};
@@ -221,7 +183,7 @@ static uint8_t use_gateway(void *object)
     return MBM_OK;
 }
 
-static uint8_t use_sniffer(void *object)
+static uint8_t use_sniffer(void *object, unsigned framing)
 {
     const uint8_t begun = mbm_sniffer_begin(object, MBM_FRAMING_RTU, frame, sizeof frame);
     mbm_event event;
@@ -240,23 +202,23 @@ static void count_record(void *context, const mbm_traceRecord *record)
     ++*(unsigned *)context;
 }
 
-static uint8_t use_trace(void *object)
+static uint8_t use_trace(void *object, unsigned framing)
 {
-    mbm_framing framing = MBM_INIT;
+    const mbm_framing rtu = MBM_INIT;
     mbm_line line = MBM_INIT;
     unsigned records = 0;
-    const uint8_t begun = mbm_trace_begin(object, MBM_PACKET_REQUEST, &port, &framing, outgoing,
+    const uint8_t begun = mbm_trace_begin(object, MBM_PACKET_REQUEST, &port, &rtu, outgoing,
                                           sizeof outgoing, count_record, &records);
 
     if (begun != MBM_OK)
         return begun;
     port = *mbm_trace_port(object);
-    OK(use_line(&line));
+    OK(use_line(&line, 0));
     assert_int_equal(records, 2);
     return MBM_OK;
 }
 
-static uint8_t use_ring(void *object)
+static uint8_t use_ring(void *object, unsigned framing)
 {
     const uint8_t begun = mbm_ring_begin(object, frame, 16);
     uint8_t taken = 0;
@@ -284,12 +246,30 @@ static union {
     mbm_ring ring;
 } memory;
 
-static uint8_t (*const uses[])(void *object) = {
-    use_line,       use_node,          use_rtu_client,    use_ascii_client,
-    use_tcp_client, use_rtu_server,    use_stream_client, use_ascii_server,
-    use_tcp_server, use_link,          use_plan,          use_gateway,
-    use_sniffer,    use_stream_server, use_trace,         use_ring,
-};
+/* The functions that use an object, with a framing. */
+#define OBJECTS(USE)                                                                               \
+    USE(line, use_line, 0)                                                                         \
+    USE(node, use_node, 0)                                                                         \
+    USE(client, use_client, MBM_FRAMING_RTU)                                                       \
+    USE(client, use_client, MBM_FRAMING_ASCII)                                                     \
+    USE(client, use_client, MBM_FRAMING_TCP)                                                       \
+    USE(client, use_client, MBM_FRAMING_RTU_OVER_TCP)                                              \
+    USE(server, use_server, MBM_FRAMING_RTU)                                                       \
+    USE(server, use_server, MBM_FRAMING_ASCII)                                                     \
+    USE(server, use_server, MBM_FRAMING_TCP)                                                       \
+    USE(server, use_server, MBM_FRAMING_RTU_OVER_TCP)                                              \
+    USE(link, use_link, 0)                                                                         \
+    USE(plan, use_plan, 0)                                                                         \
+    USE(gateway, use_gateway, 0)                                                                   \
+    USE(sniffer, use_sniffer, 0)                                                                   \
+    USE(trace, use_trace, 0)                                                                       \
+    USE(ring, use_ring, 0)
+
+#define ROW(object, use, framing) {use, framing},
+static const struct {
+    uint8_t (*use)(void *object, unsigned framing);
+    unsigned framing;
+} uses[] = {OBJECTS(ROW)};
 
 static void use_all(void)
 {
@@ -301,7 +281,7 @@ static void use_all(void)
 
         reset();
         memcpy(&memory, before, sizeof before);
-        begun = uses[i](&memory);
+        begun = uses[i].use(&memory, uses[i].framing);
         if (begun != MBM_OK)
             IS(MBM_BUSY, begun);
     }
@@ -334,29 +314,14 @@ TEST(a_begin_function_works_in_memory_with_random_bytes)
 }
 
 /* The declaration that the header recommends, on a stack that holds other bytes. */
-#define WORKS(type, use)                                                                           \
-    do {                                                                                           \
-        type object = MBM_INIT;                                                                    \
+#define WORKS(type, use, framing)                                                                  \
+    {                                                                                              \
+        mbm_##type object = MBM_INIT;                                                              \
         reset();                                                                                   \
-        OK(use(&object));                                                                          \
-    } while (0)
+        OK(use(&object, framing));                                                                 \
+    }
 
 TEST(every_object_works_with_the_initialiser)
 {
-    WORKS(mbm_line, use_line);
-    WORKS(mbm_node, use_node);
-    WORKS(mbm_client, use_rtu_client);
-    WORKS(mbm_client, use_ascii_client);
-    WORKS(mbm_client, use_tcp_client);
-    WORKS(mbm_client, use_stream_client);
-    WORKS(mbm_server, use_rtu_server);
-    WORKS(mbm_server, use_ascii_server);
-    WORKS(mbm_server, use_tcp_server);
-    WORKS(mbm_server, use_stream_server);
-    WORKS(mbm_link, use_link);
-    WORKS(mbm_plan, use_plan);
-    WORKS(mbm_gateway, use_gateway);
-    WORKS(mbm_sniffer, use_sniffer);
-    WORKS(mbm_trace, use_trace);
-    WORKS(mbm_ring, use_ring);
+    OBJECTS(WORKS)
 }
