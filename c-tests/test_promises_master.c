@@ -204,29 +204,24 @@ TEST(callbacks_have_the_rules_of_the_header)
 {
     static mbm_nodeCallbacks callbacks, never;
     static const mbm_nodeCallbacks zero;
-    mbm_port lacking = port;
 
     memset(&callbacks, 0, sizeof callbacks);
     assert_null(mbm_nodeCallbacks_port(NULL));
     assert_null(mbm_nodeCallbacks_port(&never));
     IS(MBM_INVALID_ARGUMENT, mbm_nodeCallbacks_begin(NULL, &port));
-    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, NULL));
-    lacking.read = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
-    lacking = port;
-    lacking.write = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
-    lacking = port;
-    lacking.micros = NULL;
-    REFUSED(MBM_INVALID_ARGUMENT, callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
+    INVALID(callbacks, mbm_nodeCallbacks_begin(&callbacks, NULL));
+    for (int hook = HOOK_READ; hook <= HOOK_MICROS; hook++) {
+        const mbm_port lacking = hooked_port_without(&wire, hook);
+
+        INVALID(callbacks, mbm_nodeCallbacks_begin(&callbacks, &lacking));
+    }
     assert_memory_equal(&callbacks, &zero, sizeof zero);
     /* A line without them, and one without a port. */
     REFUSED(MBM_NOT_INITIALISED, line, mbm_node_idle(&m, nothing));
     REFUSED(MBM_NOT_INITIALISED, line, mbm_node_preTransmission(&m, nothing));
     REFUSED(MBM_NOT_INITIALISED, line, mbm_node_postTransmission(&m, NULL));
     OK(mbm_nodeCallbacks_begin(&callbacks, &port));
-    REFUSED(MBM_INVALID_ARGUMENT, callbacks,
-            mbm_nodeCallbacks_begin(&callbacks, mbm_nodeCallbacks_port(&callbacks)));
+    INVALID(callbacks, mbm_nodeCallbacks_begin(&callbacks, mbm_nodeCallbacks_port(&callbacks)));
     OK(mbm_line_beginRtu(&line, mbm_nodeCallbacks_port(&callbacks), frame, sizeof frame));
     OK(mbm_node_idle(&m, nothing));
     OK(mbm_node_preTransmission(&m, nothing));

@@ -275,7 +275,7 @@ TEST(the_order_of_a_view_is_that_of_calls_without_one)
     OK(mbm_registers_setByteOrder(&r, MBM_ORDER_DEFAULT));
     OK(mbm_registers_getUint32(&r, FIRST, MBM_ORDER_DEFAULT, &number));
     assert_int_equal(number, 0x5652AE41);
-    REFUSED(MBM_INVALID_ARGUMENT, r, mbm_registers_setByteOrder(&r, MBM_ORDER_DCBAHGFE + 1));
+    INVALID(r, mbm_registers_setByteOrder(&r, MBM_ORDER_DCBAHGFE + 1));
     IS(MBM_INVALID_ARGUMENT, mbm_registers_setByteOrder(NULL, MBM_ORDER_ABCD));
     r.data = NULL;
     REFUSED(MBM_NOT_INITIALISED, r, mbm_registers_setByteOrder(&r, MBM_ORDER_ABCD));
