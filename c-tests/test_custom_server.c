@@ -80,7 +80,27 @@ TEST(the_tenth_register_is_the_last)
     assert_int_equal(run("65535", "2", NULL), 1);
     assert_int_equal(run("10", "=", "1"), 1);
     assert_string_equal(exchange("41 00 09 00 02"), "C1 02");
-    assert_string_equal(exchange("42 00 09 00 02 04 00 01 00 02"), "C2 02");
+}
+
+TEST(a_write_past_the_end_answers_04_and_changes_nothing)
+{
+    assert_string_equal(exchange("42 00 09 00 02 04 00 01 00 02"), "C2 04");
+    assert_string_equal(exchange("42 FF FF 00 01 02 00 01"), "C2 04");
+    assert_int_equal(run("10", "=", "1"), 1);
+    assert_string_equal(exchange("41 00 09 00 01"), "41 00 09 02 00 00");
+}
+
+TEST(all_ten_registers_are_written_at_once)
+{
+    const char *const write[] = {"127.0.0.1", service, "0", "=", "1", "2",  "3", "4",
+                                 "5",         "6",     "7", "8", "9", "10", NULL};
+    program client;
+
+    program_start(&client, "linux/custom_client", write);
+    program_rest(&client, output, sizeof output);
+    assert_int_equal(program_end(&client), 0);
+    assert_int_equal(run("0", "10", NULL), 0);
+    assert_string_equal(output, "1\n2\n3\n4\n5\n6\n7\n8\n9\n10\n");
 }
 
 TEST(wrong_lengths_return_03_and_change_nothing)

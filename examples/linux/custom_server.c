@@ -7,6 +7,9 @@
  *     41   request: address, quantity                        response: address, byte count, values
  *     42   request: address, quantity, byte count, values    response: address, quantity
  *
+ * A read past the last register is refused with exception 02, a write with 04, a wrong length with
+ * 03.
+ *
  * custom_client.c is the other side. Licence: MIT OR Apache-2.0. */
 #include "mbm_tcp.h"
 
@@ -53,8 +56,9 @@ static uint16_t serve_write(void *context, const mbm_request *request, uint8_t *
     if (request->length < 6 || data[4] != request->length - 5 || data[4] != 2 * word_at(data + 2))
         return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_VALUE;
     address = word_at(data);
+    /* 04, as Qt's example of custom commands answers a write that its registers do not take. */
     if (address + word_at(data + 2) > REGISTERS || capacity < 4)
-        return MBM_REPLY_EXCEPTION | MBM_ILLEGAL_DATA_ADDRESS;
+        return MBM_REPLY_EXCEPTION | MBM_SERVER_DEVICE_FAILURE;
     for (i = 0; i < data[4]; i++)
         registers[2 * address + i] = data[5 + i];
     for (i = 0; i < 4; i++)
