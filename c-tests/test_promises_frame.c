@@ -308,6 +308,67 @@ TEST(a_frame_that_does_not_hold_fills_in_what_is_known)
     IS(MBM_ILLEGAL_FUNCTION, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, frame, 8, &packet));
 }
 
+TEST(a_frame_is_parsed_whatever_its_crc_is)
+{
+    static const uint8_t wanted[] = {17, 3, 0, 107, 0, 3};
+    uint8_t bytes[MBM_MAX_FRAME + 1];
+    uint8_t text[] = ":1103006B00037F\r\n";
+    mbm_packet packet;
+
+    memset(bytes, 0x5A, sizeof bytes);
+    memcpy(bytes, wanted, sizeof wanted);
+    IS(MBM_INVALID_CRC, mbm_frame_parse(&rtu, MBM_PACKET_REQUEST, bytes, 8, &packet));
+    OK(mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, 8, &packet));
+    assert_true(packet.unit == 17 && packet.address == 107 && packet.quantity == 3);
+    /* Everything else is checked as by mbm_frame_parse. */
+    IS(MBM_MALFORMED_REPLY,
+       mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_RESPONSE, bytes, 8, &packet));
+    IS(MBM_ILLEGAL_DATA_VALUE,
+       mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, 9, &packet));
+    for (uint16_t length = 0; length < 4; length++)
+        IS(MBM_INCOMPLETE_FRAME,
+           mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, length, &packet));
+    IS(MBM_MALFORMED_FRAME,
+       mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, sizeof bytes, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(NULL, 0, bytes, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(&rtu, 2, bytes, 8, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(&rtu, 0, NULL, 8, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_parseWithoutCrc(&rtu, 0, bytes, 8, NULL));
+    /* The LRC of ASCII is checked: it should be 7E. */
+    IS(MBM_INVALID_CRC, mbm_frame_parseWithoutCrc(&ascii, MBM_PACKET_REQUEST, text,
+                                                  (uint16_t)(sizeof text - 1), &packet));
+}
+
+TEST(an_exception_is_taken_out_of_its_frame)
+{
+    uint8_t of_rtu[] = {0x0A, 0x81, 2, 0xB0, 0x53};
+    uint8_t of_tcp[] = {0xDA, 0x87, 0, 0, 0, 3, 1, 0x81, 3};
+    uint8_t response[] = {17, 3, 2, 0, 7, 0, 0};
+    const mbm_framing none = {.kind = MBM_FRAMING_NONE};
+    mbm_packet packet, parsed;
+
+    OK(mbm_frame_asException(&rtu, of_rtu, sizeof of_rtu, &packet));
+    assert_int_equal(packet.kind, MBM_PACKET_EXCEPTION);
+    assert_true(packet.unit == 10 && packet.function == 1 && packet.exceptionCode == 2);
+    OK(mbm_frame_parse(&rtu, MBM_PACKET_RESPONSE, of_rtu, sizeof of_rtu, &parsed));
+    assert_memory_equal(&packet, &parsed, sizeof packet);
+    OK(mbm_frame_asException(&tcp, of_tcp, sizeof of_tcp, &packet));
+    assert_true(packet.transaction == 0xDA87 && packet.exceptionCode == 3);
+    of_rtu[3] ^= 1;
+    REFUSED(MBM_INVALID_CRC, packet, mbm_frame_asException(&rtu, of_rtu, 5, &packet));
+    REFUSED(MBM_INCOMPLETE_FRAME, packet, mbm_frame_asException(&rtu, of_rtu, 3, &packet));
+    of_tcp[8] = 0;
+    REFUSED(MBM_MALFORMED_REPLY, packet, mbm_frame_asException(&tcp, of_tcp, 9, &packet));
+    of_tcp[8] = 128;
+    REFUSED(MBM_MALFORMED_REPLY, packet, mbm_frame_asException(&tcp, of_tcp, 9, &packet));
+    seal(response, 5);
+    REFUSED(MBM_INVALID_FUNCTION, packet, mbm_frame_asException(&rtu, response, 7, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(NULL, of_tcp, 9, &packet));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(&tcp, NULL, 9, &packet));
+    IS(MBM_INVALID_ARGUMENT, mbm_frame_asException(&tcp, of_tcp, 9, NULL));
+    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(&none, of_tcp, 9, &packet));
+}
+
 TEST(bytes_look_like_tcp_from_the_eighth_on)
 {
     uint8_t bytes[12] = {0x12, 0x34, 0, 0, 0, 6, 17, 3, 0, 107, 0, 3};

@@ -2,7 +2,10 @@
 
 use super::framing::mbm_framing;
 use super::functions::declared;
-use super::packet::{mbm_length, mbm_packet, put_expected, reply_length, side, MBM_PACKET_REQUEST};
+use super::packet::{
+    mbm_length, mbm_packet, put_expected, reply_length, side, MBM_PACKET_EXCEPTION,
+    MBM_PACKET_REQUEST,
+};
 use super::pointers::{In, Out};
 use mbm::error::{Error, Status};
 use mbm::frame::checksum::{crc16, lrc, Crc16};
@@ -115,6 +118,47 @@ pub extern "C" fn mbm_frame_parse(
     frameLength: u16,
     packet: Out<mbm_packet>,
 ) -> u8 {
+    parse(framing, kind, frame, frameLength, packet, Framing::parse)
+}
+
+/// As mbm_frame_parse, but does not check the CRC of an RTU frame: for bytes that another layer has
+/// checked, or a log that does not keep the CRC. The two bytes of the CRC must be there, with any
+/// value. Other framings are parsed as by mbm_frame_parse.
+///
+/// Any thread or interrupt may call it.
+///
+/// @return as mbm_frame_parse. MBM_INVALID_CRC is returned only for the LRC of an ASCII frame
+#[no_mangle]
+pub extern "C" fn mbm_frame_parseWithoutCrc(
+    framing: In<mbm_framing>,
+    kind: u8,
+    frame: Out<u8>,
+    frameLength: u16,
+    packet: Out<mbm_packet>,
+) -> u8 {
+    parse(
+        framing,
+        kind,
+        frame,
+        frameLength,
+        packet,
+        Framing::parse_without_crc,
+    )
+}
+
+/// Finds the unit and the PDU in a frame.
+type Unframe = for<'a> fn(Framing, &'a mut [u8], u8) -> Result<Adu<'a>, Error>;
+
+/// Parses a frame into a packet, with `unframe`.
+#[inline(always)]
+fn parse(
+    framing: In<mbm_framing>,
+    kind: u8,
+    frame: Out<u8>,
+    frameLength: u16,
+    packet: Out<mbm_packet>,
+    unframe: Unframe,
+) -> u8 {
     let arguments = side(kind).and_then(|pdu_kind| {
         packet.required()?;
         let bytes = frame.buffer(frameLength)?;
@@ -127,7 +171,7 @@ pub extern "C" fn mbm_frame_parse(
     };
     let mut found = mbm_packet::of(kind, &[]);
     let adu = match format.framing {
-        Some(framing) => framing.parse(bytes, format.end),
+        Some(framing) => unframe(framing, bytes, format.end),
         None => Ok(Adu {
             transaction: 0,
             unit: 0,
@@ -146,6 +190,50 @@ pub extern "C" fn mbm_frame_parse(
     };
     packet.put(found);
     status.code()
+}
+
+/// Takes the exception out of a frame, without the code for other responses.
+///
+/// Any thread or interrupt may call it.
+///
+/// @param frame        the frame, from its first byte to its last. An ASCII frame is decoded in
+///                     place, which overwrites it
+/// @param frameLength  the number of bytes of `frame`
+/// @param packet       receives the exception: its kind is MBM_PACKET_EXCEPTION, `function` is the
+///                     function code of the request, without the bit 0x80. It does not change
+///                     unless the status is MBM_OK
+/// @return a status; MBM_INVALID_FUNCTION if the frame is valid but no exception;
+///         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME or MBM_INVALID_CRC if it is not valid;
+///         MBM_MALFORMED_REPLY for an exception of another length, or with a code that is not 1 to
+///         127; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
+#[no_mangle]
+pub extern "C" fn mbm_frame_asException(
+    framing: In<mbm_framing>,
+    frame: Out<u8>,
+    frameLength: u16,
+    packet: Out<mbm_packet>,
+) -> u8 {
+    let take = || {
+        packet.required()?;
+        let bytes = frame.buffer(frameLength)?;
+        let format = format(framing, |_| None)?;
+        let framing = format.framing.ok_or(Error::InvalidArgument)?;
+        let exception = Exception::parse(framing, bytes, format.end)?;
+        let Head {
+            transaction,
+            unit,
+            function,
+        } = exception.head();
+        packet.put(mbm_packet {
+            transaction,
+            unit: unit.into(),
+            function,
+            exceptionCode: exception.code(),
+            ..mbm_packet::of(MBM_PACKET_EXCEPTION, &[])
+        });
+        Ok(())
+    };
+    Status::from(take()).code()
 }
 
 /// Writes the frame of the exception that answers a request. Pass the status of

@@ -210,6 +210,37 @@ uint8_t mbm_frame_parse(const mbm_framing *framing, uint8_t kind, uint8_t *frame
                         uint16_t frameLength, mbm_packet *packet);
 
 /**
+ * As mbm_frame_parse, but does not check the CRC of an RTU frame: for bytes that another layer has
+ * checked, or a log that does not keep the CRC. The two bytes of the CRC must be there, with any
+ * value. Other framings are parsed as by mbm_frame_parse.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @return as mbm_frame_parse. MBM_INVALID_CRC is returned only for the LRC of an ASCII frame
+ */
+uint8_t mbm_frame_parseWithoutCrc(const mbm_framing *framing, uint8_t kind, uint8_t *frame,
+                                  uint16_t frameLength, mbm_packet *packet);
+
+/**
+ * Takes the exception out of a frame, without the code for other responses.
+ *
+ * Any thread or interrupt may call it.
+ *
+ * @param frame        the frame, from its first byte to its last. An ASCII frame is decoded in
+ *                     place, which overwrites it
+ * @param frameLength  the number of bytes of `frame`
+ * @param packet       receives the exception: its kind is MBM_PACKET_EXCEPTION, `function` is the
+ *                     function code of the request, without the bit 0x80. It does not change
+ *                     unless the status is MBM_OK
+ * @return a status; MBM_INVALID_FUNCTION if the frame is valid but no exception;
+ *         MBM_INCOMPLETE_FRAME, MBM_MALFORMED_FRAME or MBM_INVALID_CRC if it is not valid;
+ *         MBM_MALFORMED_REPLY for an exception of another length, or with a code that is not 1 to
+ *         127; MBM_INVALID_ARGUMENT also for MBM_FRAMING_NONE
+ */
+uint8_t mbm_frame_asException(const mbm_framing *framing, uint8_t *frame, uint16_t frameLength,
+                              mbm_packet *packet);
+
+/**
  * Writes the frame of the exception that answers a request. Pass the status of
  * mbm_frame_parse if that refused the request, or an exception code of your choice if your
  * device refuses it.

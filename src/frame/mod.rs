@@ -63,6 +63,18 @@ impl Framing {
         }
     }
 
+    /// As [`Framing::parse`], but does not check the CRC of an RTU frame. The two bytes of the CRC
+    /// must be there. Other framings are parsed as ever.
+    ///
+    /// # Errors
+    /// As [`Framing::parse`].
+    pub fn parse_without_crc(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
+        match self {
+            Framing::Rtu | Framing::RtuOverTcp => rtu::parse_without_crc(bytes),
+            _ => self.parse(bytes, end),
+        }
+    }
+
     /// Writes a frame to `buffer` and returns its length. The callback `pdu` writes the PDU to
     /// the front of the slice that it gets, and returns the length of the PDU. Only TCP uses
     /// `transaction`, only ASCII uses `end`.

@@ -49,6 +49,39 @@ impl Exception {
         }
     }
 
+    /// The exception in the frame `bytes`. `end` is the last character of an ASCII frame.
+    ///
+    /// # Errors
+    /// As [`Framing::parse`]; [`Error::InvalidFunction`] if the frame is no exception;
+    /// [`Error::MalformedReply`] for an exception of another length or without a valid code.
+    pub fn parse(framing: Framing, bytes: &mut [u8], end: u8) -> Result<Self, Error> {
+        let adu = framing.parse(bytes, end)?;
+        match *adu.pdu {
+            [function, code]
+                if function & EXCEPTION != 0 && Status::from_code(code).is_exception() =>
+            {
+                let head = Head {
+                    transaction: adu.transaction,
+                    unit: adu.unit,
+                    function: function & !EXCEPTION,
+                };
+                Ok(Exception { head, code })
+            }
+            [function, ..] if function & EXCEPTION != 0 => Err(Error::MalformedReply),
+            _ => Err(Error::InvalidFunction),
+        }
+    }
+
+    /// The head of the request that the exception answers.
+    pub const fn head(&self) -> Head {
+        self.head
+    }
+
+    /// The exception code, 1 to 127.
+    pub const fn code(&self) -> u8 {
+        self.code
+    }
+
     /// Writes the frame and returns its length in bytes. `end` is the last character of an
     /// ASCII frame.
     ///
@@ -161,5 +194,32 @@ mod tests {
         assert_eq!(found, (Status::ILLEGAL_FUNCTION, Some(reply)));
         let found = answer(Framing::Tcp, &[0, 1, 0, 0, 0, 2, 7, 0x83]);
         assert_eq!(found, (Status::ILLEGAL_FUNCTION, None));
+    }
+
+    #[test]
+    fn an_exception_is_taken_out_of_its_frame() {
+        let mut rtu = [0x0A, 0x81, 2, 0xB0, 0x53];
+        let found = Exception::parse(Framing::Rtu, &mut rtu, END).unwrap();
+        assert_eq!(
+            (found.head().unit, found.head().function, found.code()),
+            (0x0A, 1, 2)
+        );
+        let mut tcp = [0xDA, 0x87, 0, 0, 0, 3, 1, 0x81, 3];
+        let found = Exception::parse(Framing::Tcp, &mut tcp, END).unwrap();
+        assert_eq!((found.head().transaction, found.code()), (0xDA87, 3));
+        rtu[4] ^= 1;
+        let found = Exception::parse(Framing::Rtu, &mut rtu, END);
+        assert_eq!(found, Err(Error::InvalidCrc));
+        for (pdu, error) in [
+            (&[3, 2, 0, 7][..], Error::InvalidFunction),
+            (&[0x83], Error::MalformedReply),
+            (&[0x83, 0], Error::MalformedReply),
+            (&[0x83, 0x80], Error::MalformedReply),
+            (&[0x83, 2, 0], Error::MalformedReply),
+        ] {
+            let mut frame = std::vec![0, 1, 0, 0, 0, pdu.len() as u8 + 1, 17];
+            frame.extend(pdu);
+            assert_eq!(Exception::parse(Framing::Tcp, &mut frame, END), Err(error));
+        }
     }
 }

@@ -60,7 +60,14 @@ fn parse(w: &World) {
     call!(w, mbm_frame_lrc(bytes, length));
 
     let packet = w.null_or(64, || w.unset::<mbm_packet>());
-    let status = call!(w, mbm_frame_parse(framing, kind, bytes, length, packet));
+    let status = match w.byte() % 8 {
+        0 => call!(w, mbm_frame_asException(framing, bytes, length, packet)),
+        1 => call!(
+            w,
+            mbm_frame_parseWithoutCrc(framing, kind, bytes, length, packet)
+        ),
+        _ => call!(w, mbm_frame_parse(framing, kind, bytes, length, packet)),
+    };
     is_status("mbm_frame_parse", status);
     if status == OK {
         is_packet(packet);
