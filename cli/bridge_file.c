@@ -14,10 +14,10 @@
 enum { LONGEST_LINE = 1500, LONGEST_VALUE = 1000, LONGEST_PREFIX = 50 };
 
 const char *const bridge_names[] = {
-    "broker", "topic", "id",         "user",           "ca",
-    "cert",   "key",   "keep_alive", "discovery",      "discovery_prefix",
-    "plain",  "all",   "gap",        "write_function", "lines",
-    NULL};
+    "broker",         "topic", "id",         "user",           "ca",
+    "cert",           "key",   "keep_alive", "discovery",      "discovery_prefix",
+    "plain",          "all",   "gap",        "write_function", "lines",
+    REACH_FILE_NAMES, NULL};
 
 enum { LINE, THE_FILE, LINE_TOPIC, LINE_REACH, LINE_KEYS = LINE_REACH + REACH_FILE_KEYS };
 static const char *const LINE_NAMES[] = {"line", "file", "topic", REACH_FILE_NAMES, NULL};
@@ -261,17 +261,19 @@ static void join_path(const char *of, const char *path, char full[2 * LONGEST_VA
                  path);
 }
 
-/* Reads what the device needs. The name of the line counts first. */
+/* Reads what the device needs. The name of the line counts first, and `shared` last. */
 static int read_reach(yaml_file *file, const yaml_node_t *node, const yaml_node_t *const *values,
-                      place *into)
+                      const reach *shared, place *into)
 {
     const reach_line has = place_reach(into, 1);
-    reach own = {0};
+    reach own = {0}, rest = *shared;
     const char *wrong;
 
     if (!reach_read_nodes(file, values, &own))
         return 0;
+    reach_fit(&rest, &has);
     reach_fill(&into->reach, &own);
+    reach_fill(&into->reach, &rest);
     wrong = reach_check(&into->reach, &has, "");
     return wrong ? yaml_file_refuse(file, node, "%s", wrong) : 1;
 }
@@ -297,7 +299,8 @@ static int read_line(yaml_file *file, const yaml_node_t *node, bridge_setup *int
     wrong = bridge_setup_line(into, text, full, topic);
     if (wrong)
         return yaml_file_refuse(file, node, "%s", wrong);
-    return read_reach(file, node, values + LINE_REACH, &into->lines[into->line_count - 1].place);
+    return read_reach(file, node, values + LINE_REACH, &into->reach,
+                      &into->lines[into->line_count - 1].place);
 }
 
 static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
@@ -325,6 +328,8 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
     wrong = bridge_setup_check(into, "");
     if (wrong)
         return yaml_file_refuse(file, root, "%s", wrong);
+    if (!reach_read_nodes(file, values + BRIDGE_REACH, &into->reach))
+        return 0;
     count = yaml_file_items(file, "lines", values[BRIDGE_THE_LINES], BRIDGE_LINES);
     for (at = 0; at < count; at++)
         if (!read_line(file, yaml_file_item(file, values[BRIDGE_THE_LINES], at), into))

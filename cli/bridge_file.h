@@ -33,7 +33,8 @@ enum {
     BRIDGE_GAP,
     BRIDGE_WRITE_FUNCTION,
     BRIDGE_THE_LINES,
-    BRIDGE_KEYS,
+    BRIDGE_REACH,
+    BRIDGE_KEYS = BRIDGE_REACH + REACH_FILE_KEYS,
     BRIDGE_SETTINGS = BRIDGE_THE_LINES
 };
 /* Their keys in the file; those of the options have - for _. NULL ends them. */
@@ -41,6 +42,7 @@ extern const char *const bridge_names[];
 
 typedef struct bridge_setup {
     char *values[BRIDGE_SETTINGS]; /* NULL: not given */
+    reach reach;                   /* of all lines, as far as they can have it */
     uint8_t line_count;
     struct {
         char *text, *path, *topic;

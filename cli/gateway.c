@@ -429,7 +429,7 @@ static void print_summary(gateway *g)
 
 /* --- the command line --- */
 
-enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REPLACE_AFTER, REQUESTS, TIMEOUT };
+enum { CHECK = 0x100, IDLE, IN_FLIGHT, QUEUE_TIME, QUIET_TIME, REPLACE_AFTER, REQUESTS };
 
 /* Reads a word that is no option: FILE, or LISTEN and then LINE and UNITS by turns. */
 static void read_word(gateway *g, const struct argp_state *state, char *text)
@@ -476,9 +476,6 @@ static error_t parse(int key, char *text, struct argp_state *state)
             (uint32_t)options_number(state, "--replace-after", text, 0, 100);
         return 0;
     case IDLE: g->given.idleMs = options_time(state, "--idle", text, 0, 1000000000); return 0;
-    case TIMEOUT:
-        g->given.pace.timeoutMs = options_time(state, "--timeout", text, 1, UINT16_MAX);
-        return 0;
     case QUIET_TIME:
         g->given.pace.quietMs = options_time(state, "--quiet-time", text, 0, UINT16_MAX);
         return 0;
@@ -513,8 +510,6 @@ static const struct argp_option texts[] = {
      "Requests in a row without any byte after which the connection to a device is made anew, 0 to 100 "
      "(2); 0 for never",
      2},
-    {"timeout", TIMEOUT, "TIME", 0,
-     "How long a device may take to reply, and a connection to it to be made, up to 65s (1s)", 2},
     {"quiet-time", QUIET_TIME, "TIME", 0,
      "How long a line is left alone after a request without a right reply (100ms)", 2},
     {"queue-time", QUEUE_TIME, "TIME", 0,
@@ -556,7 +551,7 @@ int gateway_command(int argc, char **argv)
     g->given.idleMs = 60000;
     g->given.connections = CONNECTIONS;
     g->given.requests = 8;
-    g->given.pace = (gateway_pace){1000, 100, 1, 2};
+    g->given.pace = (gateway_pace){100, 1, 2};
     g->config = (mbm_gatewayConfig){.routes = g->routes,
                                     .routeCount = ROUTES,
                                     .lines = g->gateway_lines,

@@ -18,7 +18,6 @@ enum {
     REQUESTS,
     IDLE,
     QUEUE_TIME,
-    TIMEOUT,
     QUIET_TIME,
     IN_FLIGHT,
     REPLACE_AFTER,
@@ -27,12 +26,11 @@ enum {
     GATEWAY_KEYS = GATEWAY_REACH + REACH_FILE_KEYS
 };
 static const char *const GATEWAY_NAMES[] = {
-    "listen",     "connections", "requests",      "idle",  "queue_time",     "timeout",
-    "quiet_time", "in_flight",   "replace_after", "lines", REACH_FILE_NAMES, NULL};
+    "listen",    "connections",   "requests", "idle",           "queue_time", "quiet_time",
+    "in_flight", "replace_after", "lines",    REACH_FILE_NAMES, NULL};
 enum {
     LINE,
     UNITS,
-    LINE_TIMEOUT,
     LINE_QUIET_TIME,
     LINE_IN_FLIGHT,
     LINE_REPLACE_AFTER,
@@ -40,7 +38,7 @@ enum {
     LINE_KEYS = LINE_REACH + REACH_FILE_KEYS
 };
 static const char *const LINE_NAMES[] = {
-    "line", "units", "timeout", "quiet_time", "in_flight", "replace_after", REACH_FILE_NAMES, NULL};
+    "line", "units", "quiet_time", "in_flight", "replace_after", REACH_FILE_NAMES, NULL};
 
 /* --- the map of units --- */
 
@@ -152,10 +150,9 @@ const char *gateway_setup_listen(gateway_setup *to, const char *text)
 /* Reads the settings that a line may have of its own. The keys follow each other. */
 static int read_pace(yaml_file *file, const yaml_node_t *const *values, gateway_pace *pace)
 {
-    return yaml_file_time(file, "timeout", values[0], 1, UINT16_MAX, &pace->timeoutMs) &&
-           yaml_file_time(file, "quiet_time", values[1], 0, UINT16_MAX, &pace->quietMs) &&
-           yaml_file_number(file, "in_flight", values[2], 1, MBM_CLIENT_DEPTH, &pace->in_flight) &&
-           yaml_file_number(file, "replace_after", values[3], 0, 100, &pace->replace_after);
+    return yaml_file_time(file, "quiet_time", values[0], 0, UINT16_MAX, &pace->quietMs) &&
+           yaml_file_number(file, "in_flight", values[1], 1, MBM_CLIENT_DEPTH, &pace->in_flight) &&
+           yaml_file_number(file, "replace_after", values[2], 0, 100, &pace->replace_after);
 }
 
 static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *into)
@@ -179,7 +176,7 @@ static int read_line(yaml_file *file, const yaml_node_t *node, gateway_setup *in
     if (wrong)
         return yaml_file_refuse(file, values[UNITS], "units: %s", wrong);
     into->lines[into->line_count - 1].pace = into->pace;
-    if (!read_pace(file, &values[LINE_TIMEOUT], &into->lines[into->line_count - 1].pace) ||
+    if (!read_pace(file, &values[LINE_QUIET_TIME], &into->lines[into->line_count - 1].pace) ||
         !reach_read_nodes(file, values + LINE_REACH, &own))
         return 0;
     reach_fill(&into->lines[into->line_count - 1].place.reach, &own);
@@ -209,7 +206,7 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *setup)
                           &into->requests) ||
         !yaml_file_time(file, "idle", values[IDLE], 0, 1000000000, &into->idleMs) ||
         !yaml_file_time(file, "queue_time", values[QUEUE_TIME], 0, UINT16_MAX, &into->queueMs) ||
-        !read_pace(file, &values[TIMEOUT], &into->pace) ||
+        !read_pace(file, &values[QUIET_TIME], &into->pace) ||
         !reach_read_nodes(file, values + GATEWAY_REACH, &into->reach))
         return 0;
     count = yaml_file_items(file, "lines", values[THE_LINES], GATEWAY_LINES);

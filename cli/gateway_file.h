@@ -25,7 +25,7 @@ enum {
 
 /* The settings that a line may have of its own. */
 typedef struct gateway_pace {
-    uint32_t timeoutMs, quietMs, in_flight, replace_after;
+    uint32_t quietMs, in_flight, replace_after;
 } gateway_pace;
 
 typedef struct gateway_setup {

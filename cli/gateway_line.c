@@ -15,11 +15,11 @@ enum { SILENT_AFTER = 5 };
 
 void gateway_line_set(gateway_line *l, const gateway_pace *pace, const reach *what)
 {
-    line_set(&l->at, pace->timeoutMs, (uint8_t)pace->in_flight, (uint8_t)pace->replace_after);
+    line_set(&l->at, (uint8_t)pace->in_flight, (uint8_t)pace->replace_after);
     l->in_flight = l->at.place.framing == MBM_FRAMING_TCP ? pace->in_flight : 1;
     (void)mbm_client_setQuietTime(&l->at.client, pace->quietMs);
-    (void)mbm_link_setConnectTimeout(&l->at.kept, pace->timeoutMs);
     line_reach(&l->at, what);
+    (void)mbm_link_setConnectTimeout(&l->at.kept, reach_timeout(&l->at.place.reach));
 }
 
 int gateway_line_begin(gateway_line *l, const place *where, const gateway_pace *pace)

@@ -14,7 +14,8 @@ static const char *const NAMES[REACH_KEYS] = {[REACH_ACCEPT] = "ACCEPT",
                                               [REACH_CLOSE] = "CLOSE",
                                               [REACH_RETRIES] = "RETRIES",
                                               [REACH_BUSY_RETRIES] = "BUSY_RETRIES",
-                                              [REACH_BUSY_WAIT] = "BUSY_WAIT_MS"};
+                                              [REACH_BUSY_WAIT] = "BUSY_WAIT_MS",
+                                              [REACH_TIMEOUT] = "TIMEOUT_MS"};
 
 /* What the functions call, in this order: last what the frames of a client may not have. */
 typedef struct setting {
@@ -23,7 +24,8 @@ typedef struct setting {
     const char *function;
 } setting;
 
-static const setting SETTINGS[] = {{REACH_RETRIES, 0, "mbm_client_setRetries"},
+static const setting SETTINGS[] = {{REACH_TIMEOUT, 0, "mbm_client_setResponseTimeout"},
+                                   {REACH_RETRIES, 0, "mbm_client_setRetries"},
                                    {REACH_BUSY_RETRIES, 0, "mbm_client_setBusyRetries"},
                                    {REACH_MESSAGE_WAIT, 0, "mbm_client_setMessageWait"},
                                    {REACH_LENIENT, 0, "mbm_client_setLenient"},
@@ -43,6 +45,7 @@ static uint32_t value_of(const reach *of, int key)
     case REACH_CLOSE: return reach_closes(of);
     case REACH_RETRIES: return of->retries;
     case REACH_BUSY_RETRIES: return of->busy_retries;
+    case REACH_TIMEOUT: return of->timeoutMs;
     default: return reach_busy_wait(of);
     }
 }

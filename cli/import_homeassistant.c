@@ -442,10 +442,23 @@ static void make_line(import *j, tree *hub)
                     host, port);
 }
 
+/* Reads timeout, a number of seconds that may have a fraction. Without it, Home Assistant waits
+ * five seconds. */
+static void import_timeout(import *j, tree *hub)
+{
+    const double seconds = strtod(tree_text(hub, "timeout", "5"), NULL);
+    char time[32];
+
+    if (seconds >= 0.001 && seconds <= 1000)
+        import_set(j, IMPORT_HEAD, line_of(hub, "timeout"), "timeout", "%s",
+                   number_time_text((uint32_t)(seconds * 1000 + 0.5), time));
+    else
+        import_lose(j, line_of(hub, "timeout"), "timeout", "a timeout is from 1ms to 1000s");
+}
+
 static void import_hub(import *j, tree *hub)
 {
     const char *name = tree_text(hub, "name", NULL), *delay = tree_text(hub, "delay", "0");
-    const char *timeout = tree_text(hub, "timeout", NULL);
     const char *pause = tree_text(hub, "message_wait_milliseconds", "0");
 
     make_line(j, hub);
@@ -461,9 +474,7 @@ static void import_hub(import *j, tree *hub)
                    "%sms", pause);
     if (is_true(tree_text(hub, "close_comm_on_error", NULL)))
         import_set(j, IMPORT_HEAD, line_of(hub, "close_comm_on_error"), "close", "error");
-    if (timeout)
-        import_lose(j, line_of(hub, "timeout"), "timeout",
-                    "it is an option of the commands: --timeout %ss", timeout);
+    import_timeout(j, hub);
     import_each(j, hub, "sensors", import_sensor);
     import_each(j, hub, "binary_sensors", import_binary_sensor);
     import_each(j, hub, "switches", import_switch);

@@ -302,10 +302,22 @@ static void import_workarounds(import *j, tree *plugin)
     import_lose_rest(j, of, "workarounds");
 }
 
+/* Reads timeout, which Go may write as a device file does not: 1m30s. */
+static void import_timeout(import *j, tree *plugin)
+{
+    const char *text = tree_text(plugin, "timeout", NULL);
+    uint32_t milliseconds;
+    const char *wrong = text ? number_time(text, 1, 1000000, &milliseconds) : NULL;
+
+    if (wrong)
+        import_lose(j, tree_peek(plugin, "timeout")->line, "timeout", "%s", wrong);
+    else if (text)
+        import_set(j, IMPORT_HEAD, tree_peek(plugin, "timeout")->line, "timeout", "%s", text);
+}
+
 static void import_plugin(import *j, tree *plugin, tree *agent)
 {
     const char *name = tree_text(plugin, "name", NULL);
-    const char *timeout = tree_text(plugin, "timeout", NULL);
     const char *location =
         tree_text(tree_find(plugin, "workarounds"), "string_register_location", "both");
 
@@ -320,9 +332,7 @@ static void import_plugin(import *j, tree *plugin, tree *agent)
     (void)tree_find(plugin, "configuration_type");
     (void)tree_find(plugin, "debug_connection");
     (void)tree_find(plugin, "exclude_register_type_tag");
-    if (timeout)
-        import_lose(j, tree_peek(plugin, "timeout")->line, "timeout",
-                    "it is an option of the commands: --timeout %s", timeout);
+    import_timeout(j, plugin);
     set_time(j, plugin, "busy_retries", "busy_retries");
     set_time(j, plugin, "busy_retries_wait", "busy_wait");
     import_workarounds(j, plugin);

@@ -293,11 +293,10 @@ static void begin_client(line *l)
     (void)mbm_client_setCounters(&l->client, &l->counters);
 }
 
-void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_after)
+void line_set(line *l, uint8_t in_flight, uint8_t replace_after)
 {
     if (l->place.framing == MBM_FRAMING_TCP)
         (void)mbm_client_setInFlight(&l->client, in_flight);
-    (void)mbm_client_setResponseTimeout(&l->client, timeoutMs);
     l->replace_after = replace_after;
     if (place_is_tcp(&l->place))
         (void)mbm_link_setReplaceAfter(&l->kept, replace_after);
@@ -358,7 +357,7 @@ static int open_place(line *l, const place *where, int (*open_serial)(line *l),
     }
     begin_client(l);
     keep_open(l);
-    line_set(l, options.timeoutMs, options.in_flight, options.replace_after);
+    line_set(l, options.in_flight, options.replace_after);
     line_reach(l, &l->place.reach);
     if (where->framing == MBM_FRAMING_TCP)
         report_set_in_flight(options.in_flight);
@@ -583,7 +582,7 @@ int line_failure_of(line *l, const char *who, const mbm_clientRequest *request, 
     const uint8_t status = request->status, exception = request->exception;
     const char *why = line_why(l, status);
 
-    return report_failure(who, status, exception, options.timeoutMs, why,
+    return report_failure(who, status, exception, reach_timeout(&l->place.reach), why,
                           advice_on(&l->place, about, status, exception, why));
 }
 

@@ -53,9 +53,9 @@ int line_open_later(line *l, const place *where);
 int line_begin(line *l, const place *where);
 void line_close(line *l);
 
-/* Sets how long a reply may take, how many requests may be in flight on Modbus TCP, and after how
- * many without any byte a connection is made anew. */
-void line_set(line *l, uint32_t timeoutMs, uint8_t in_flight, uint8_t replace_after);
+/* Sets how many requests may be in flight on Modbus TCP, and after how many without any byte a
+ * connection is made anew. */
+void line_set(line *l, uint8_t in_flight, uint8_t replace_after);
 
 /* Sets what the device needs. A line that is opened has what its name says, and what the options
  * say. */

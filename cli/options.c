@@ -21,7 +21,6 @@
 enum {
     TRACE = 0x1000,
     PCAP,
-    TIMEOUT,
     IN_FLIGHT,
     REPLACE_AFTER,
     JSON,
@@ -33,8 +32,7 @@ enum {
     TIME_ZONE
 };
 
-client_options options = {.timeoutMs = 1000,
-                          .in_flight = 1,
+client_options options = {.in_flight = 1,
                           .replace_after = 2,
                           .unit = 1,
                           .table = MBM_TABLE_HOLDING_REGISTERS,
@@ -199,10 +197,6 @@ const struct argp options_trace = {.options = trace_texts, .parser = parse_trace
 static error_t parse_request(int key, char *text, struct argp_state *state)
 {
     switch (key) {
-    case TIMEOUT:
-        options.timeoutMs = options_time(state, "--timeout", text, 1, 1000000);
-        options.has_timeout = 1;
-        return 0;
     case IN_FLIGHT:
         options.in_flight =
             (uint8_t)options_number(state, "--in-flight", text, 1, MBM_CLIENT_DEPTH);
@@ -216,7 +210,6 @@ static error_t parse_request(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option request_texts[] = {
-    {"timeout", TIMEOUT, "TIME", 0, "How long a reply may take, such as 500ms or 2s (1s)", 2},
     {"in-flight", IN_FLIGHT, "N", 0,
      "Requests in flight at once on Modbus TCP, 1 to 16 (1). More are faster, but many devices take "
      "one at a time",
@@ -250,6 +243,8 @@ static error_t parse_reach(int key, char *text, struct argp_state *state)
 }
 
 static const struct argp_option reach_texts[] = {
+    {"timeout", REACH + REACH_TIMEOUT, "TIME", 0,
+     "How long a reply may take, such as 500ms or 2s, up to 1000s (1s)", 2},
     {"accept", REACH + REACH_ACCEPT, "WHAT", 0,
      "On Modbus TCP, take replies with another unit or transaction number: unit, transaction, or "
      "unit,transaction",

@@ -18,8 +18,7 @@ struct place;
 
 typedef struct client_options {
     /* of options_request */
-    uint32_t timeoutMs;
-    uint8_t has_timeout, in_flight, has_replace_after, replace_after;
+    uint8_t in_flight, has_replace_after, replace_after;
     /* of options_reach */
     reach reach;
     /* of options_output */
@@ -38,9 +37,10 @@ extern client_options options;
 
 /* --trace and --pcap; a program that is no client has these alone. */
 extern const struct argp options_trace;
-/* --accept, --lenient, --delay, --message-wait, --close, --retries, --busy-retries, --busy-wait. */
+/* --timeout, --accept, --lenient, --delay, --message-wait, --close, --retries, --busy-retries,
+ * --busy-wait. */
 extern const struct argp options_reach;
-/* --timeout, --in-flight, --replace-after, and those of options_reach. */
+/* --in-flight, --replace-after, and those of options_reach. */
 extern const struct argp options_request;
 /* --json, --quiet. */
 extern const struct argp options_output;

@@ -34,7 +34,8 @@
     "                              Modbus/TCP Security, port 802\n"                                \
     "Each line of a client may have keys for its device, as the options of these names:\n"         \
     "  accept=unit,transaction, lenient=yes, delay=2s, message_wait=30ms,\n"                       \
-    "  close=never|round|error, retries=3, busy_retries=3, busy_wait=100ms\n"
+    "  close=never|round|error, retries=3, busy_retries=3, busy_wait=100ms,\n"                     \
+    "  timeout=3s\n"
 
 enum place_kind {
     PLACE_RTU,

@@ -329,7 +329,8 @@ static void report_first_failure(polling *p)
     else if (exception == MBM_ILLEGAL_DATA_ADDRESS &&
              (p->read.setup.registerGap | p->read.setup.bitGap))
         advice = say("%s. Try without %s", advice, p->gap > 0 ? "--gap" : "gap in the file");
-    (void)report_failure(who, status, exception, options.timeoutMs, why, advice);
+    (void)report_failure(who, status, exception, reach_timeout(&p->read.at.place.reach), why,
+                         advice);
 }
 
 /* Names the fields that the device refuses, if the failure of the first does not name them all. */

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { LONGEST_TIME = 65535, MOST_RETRIES = 254, LONGEST_WORDS = 60 };
+enum { LONGEST_TIME = 65535, LONGEST_TIMEOUT = 1000000, MOST_RETRIES = 254, LONGEST_WORDS = 60 };
 
 const char *const reach_names[] = {REACH_NAMES, NULL};
 
@@ -88,6 +88,7 @@ static const char *read_value(reach *into, int key, const char *text)
     case REACH_CLOSE: return read_close(into, text);
     case REACH_RETRIES: return read_count(text, &into->retries);
     case REACH_BUSY_RETRIES: return read_count(text, &into->busy_retries);
+    case REACH_TIMEOUT: return number_time(text, 1, LONGEST_TIMEOUT, &into->timeoutMs);
     default: return number_time(text, 0, LONGEST_TIME, &into->busy_waitMs);
     }
 }
@@ -170,6 +171,7 @@ static void take(reach *into, const reach *from, int key)
     case REACH_CLOSE: into->close = from->close; break;
     case REACH_RETRIES: into->retries = from->retries; break;
     case REACH_BUSY_RETRIES: into->busy_retries = from->busy_retries; break;
+    case REACH_TIMEOUT: into->timeoutMs = from->timeoutMs; break;
     default: into->busy_waitMs = from->busy_waitMs; break;
     }
 }
@@ -186,7 +188,7 @@ void reach_fill(reach *into, const reach *from)
 
 /* --- what a line can have --- */
 
-static int has(const reach *of, int key)
+int reach_has(const reach *of, int key)
 {
     return of->given >> key & 1;
 }
@@ -196,23 +198,23 @@ const char *reach_check(const reach *of, const reach_line *line, const char *das
     const char *const wait = *dash ? "--message-wait" : "message_wait";
     const char *const in_flight = *dash ? "--in-flight" : "in_flight";
 
-    if (has(of, REACH_ACCEPT) && line->framing != MBM_FRAMING_TCP)
+    if (reach_has(of, REACH_ACCEPT) && line->framing != MBM_FRAMING_TCP)
         return say(
             "%saccept is for tcp://, tls:// and udp://: in other frames nothing but the unit "
             "tells whose a reply is",
             dash);
     if (of->is_lenient && line->framing == MBM_FRAMING_ASCII)
         return say("%slenient is not for ascii:", dash);
-    if ((has(of, REACH_DELAY) || has(of, REACH_CLOSE)) && !line->has_link)
+    if ((reach_has(of, REACH_DELAY) || reach_has(of, REACH_CLOSE)) && !line->has_link)
         return say("%s%s is not for udp://, which has no connection", dash,
-                   has(of, REACH_DELAY) ? "delay" : "close");
+                   reach_has(of, REACH_DELAY) ? "delay" : "close");
     if (of->accept & MBM_ACCEPT_TRANSACTION && line->in_flight > 1)
         return say("%saccept transaction needs one request in flight: %s is %u", dash, in_flight,
                    (unsigned)line->in_flight);
     if (of->message_waitMs > 0 && line->in_flight > 1)
         return say("%s needs one request in flight: %s is %u", wait, in_flight,
                    (unsigned)line->in_flight);
-    if (has(of, REACH_BUSY_WAIT) && !has(of, REACH_BUSY_RETRIES))
+    if (reach_has(of, REACH_BUSY_WAIT) && !reach_has(of, REACH_BUSY_RETRIES))
         return *dash ? "--busy-wait needs --busy-retries" : "busy_wait needs busy_retries";
     return NULL;
 }
@@ -253,19 +255,25 @@ void reach_fit(reach *of, const reach_line *line)
 /* A reply with another transaction number may be a late one, unless the connection is a new one. */
 uint8_t reach_closes(const reach *of)
 {
-    if (!has(of, REACH_CLOSE) && of->accept & MBM_ACCEPT_TRANSACTION)
+    if (!reach_has(of, REACH_CLOSE) && of->accept & MBM_ACCEPT_TRANSACTION)
         return MBM_LINK_CLOSE_AFTER_FAILURE;
     return of->close;
 }
 
 uint32_t reach_busy_wait(const reach *of)
 {
-    return has(of, REACH_BUSY_WAIT) ? of->busy_waitMs : REACH_BUSY_WAIT_MS;
+    return reach_has(of, REACH_BUSY_WAIT) ? of->busy_waitMs : REACH_BUSY_WAIT_MS;
+}
+
+uint32_t reach_timeout(const reach *of)
+{
+    return reach_has(of, REACH_TIMEOUT) ? of->timeoutMs : REACH_TIMEOUT_MS;
 }
 
 void reach_set(const reach *of, mbm_client *client, mbm_link *link, const reach_line *line,
                uint32_t gapUs)
 {
+    (void)mbm_client_setResponseTimeout(client, reach_timeout(of));
     (void)mbm_client_setRetries(client, of->retries);
     (void)mbm_client_setBusyRetries(client, of->busy_retries, reach_busy_wait(of));
     (void)mbm_client_setAccept(client, line->framing == MBM_FRAMING_TCP ? of->accept : 0);

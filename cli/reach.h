@@ -19,6 +19,7 @@ enum {
     REACH_RETRIES,
     REACH_BUSY_RETRIES,
     REACH_BUSY_WAIT,
+    REACH_TIMEOUT,
     REACH_KEYS,
     /* Of files alone: message_wait as a number. */
     REACH_MILLISECONDS = REACH_KEYS,
@@ -27,13 +28,14 @@ enum {
 
 /* Their names in files and in the names of lines; those of the options have - for _. */
 #define REACH_NAMES                                                                                \
-    "accept", "lenient", "delay", "message_wait", "close", "retries", "busy_retries", "busy_wait"
+    "accept", "lenient", "delay", "message_wait", "close", "retries", "busy_retries", "busy_wait", \
+        "timeout"
 #define REACH_FILE_NAMES REACH_NAMES, "message_wait_milliseconds"
 extern const char *const reach_names[];
 
 /* The keys in words, for sentences. */
 #define REACH_WORDS                                                                                \
-    "accept, lenient, delay, message_wait, close, retries, busy_retries and busy_wait"
+    "accept, lenient, delay, message_wait, close, retries, busy_retries, busy_wait and timeout"
 
 typedef struct reach {
     uint16_t given;     /* 1 << REACH_..., of what was said */
@@ -44,10 +46,11 @@ typedef struct reach {
     uint32_t delayMs;        /* after connecting */
     uint32_t message_waitMs; /* between requests */
     uint32_t busy_waitMs;
+    uint32_t timeoutMs; /* of a reply */
 } reach;
 
-/* The waits before repetitions without busy_wait. */
-enum { REACH_BUSY_WAIT_MS = 100 };
+/* The wait before repetitions without busy_wait, and the time for a reply without timeout. */
+enum { REACH_BUSY_WAIT_MS = 100, REACH_TIMEOUT_MS = 1000 };
 
 /* Reads the value of a key. Returns NULL, or what is wrong with it, in a buffer that the next call
  * overwrites. */
@@ -60,10 +63,14 @@ int reach_read_nodes(yaml_file *file, const yaml_node_t *const *values, reach *i
 /* Takes from `from` what `into` does not say. */
 void reach_fill(reach *into, const reach *from);
 
-/* When a link closes, MBM_LINK_CLOSE_; and how long to wait before a busy device is asked again,
- * in milliseconds. */
+/* When a link closes, MBM_LINK_CLOSE_; how long to wait before a busy device is asked again, and
+ * how long a reply may take, in milliseconds. */
 uint8_t reach_closes(const reach *of);
 uint32_t reach_busy_wait(const reach *of);
+uint32_t reach_timeout(const reach *of);
+
+/* Whether a key was said. */
+int reach_has(const reach *of, int key);
 
 /* What a line can do with it. */
 typedef struct reach_line {

@@ -82,8 +82,8 @@ static void check_arguments(scanning *s, const struct argp_state *state)
         s->rates[s->rate_count++] = s->where.tty.baud;
     if (s->parity_count == 0)
         s->parities[s->parity_count++] = s->where.tty.parity;
-    if (!options.has_timeout && place_is_serial(&s->where) && !s->is_sunspec)
-        options.timeoutMs = 200;
+    if (!reach_has(&options.reach, REACH_TIMEOUT) && place_is_serial(&s->where) && !s->is_sunspec)
+        (void)reach_read(&options.reach, REACH_TIMEOUT, "200ms");
     /* A scan expects that units are silent. */
     if (!options.has_replace_after)
         options.replace_after = 0;

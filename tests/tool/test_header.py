@@ -180,7 +180,7 @@ def test_the_functions_of_a_header_get_and_set_fields(mbm, folder, compiled):
 
 # --- what the device needs to be reached
 
-REACH = "device: Shy\naccept: [unit, transaction]\nlenient: yes\ndelay: 600ms\nmessage_wait: 80ms\nretries: 1\nbusy_retries: 2\nbusy_wait: 10ms\n"
+REACH = "device: Shy\naccept: [unit, transaction]\nlenient: yes\ndelay: 600ms\nmessage_wait: 80ms\nretries: 1\nbusy_retries: 2\nbusy_wait: 10ms\ntimeout: 900ms\n"
 FAR = "fields:\n" + "".join(f"- {{name: f{i}, table: holding, address: {300 * i}, type: uint16, value: {i + 7}}}\n" for i in range(3))
 SHY = "unit=0 transaction=0 needs-delay=300ms needs-message-wait=50ms exception=6@2 deaf@4".split()
 
@@ -222,6 +222,7 @@ def test_each_compiler_takes_the_functions_of_the_reach(plain, folder, write, co
     ("lenient: yes\n", {"LENIENT": "1u"}, ["client_setLenient(client, HEADER_LENIENT)"]),
     ("delay: 2s\n", {"DELAY_MS": "2000u"}, ["link_setDelayAfterConnect(link, HEADER_DELAY_MS)"]),
     ("message_wait_milliseconds: 30\n", {"MESSAGE_WAIT_MS": "30u"}, ["client_setMessageWait(client, HEADER_MESSAGE_WAIT_MS)"]),
+    ("timeout: 5s\n", {"TIMEOUT_MS": "5000u"}, ["client_setResponseTimeout(client, HEADER_TIMEOUT_MS)"]),
     ("retries: 254\n", {"RETRIES": "254u"}, ["client_setRetries(client, HEADER_RETRIES)"]),
     ("busy_retries: 3\n", {"BUSY_RETRIES": "3u", "BUSY_WAIT_MS": "100u"},
      ["client_setBusyRetries(client, HEADER_BUSY_RETRIES, HEADER_BUSY_WAIT_MS)"]),

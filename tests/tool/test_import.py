@@ -172,7 +172,7 @@ def head_of(file):
 def test_what_home_assistant_reads_is_read(imported, polled):
     file, said = imported("homeassistant", HUB)
     assert said == ""
-    assert head_of(file) == "# Made by mbm import from theirs.\n# The line: \"tcp://192.168.0.7:1502\"\ndevice: house\nunit: 1\ninterval: 15s\n"
+    assert head_of(file) == "# Made by mbm import from theirs.\n# The line: \"tcp://192.168.0.7:1502\"\ndevice: house\nunit: 1\ninterval: 15s\ntimeout: 5s\n"
     found = polled(file)
     label = wide(30, 31, 32, 33)
     expect(found, {
@@ -208,7 +208,7 @@ def test_requests_and_metrics_of_telegraf_are_read(imported, polled):
 def test_pauses_repetitions_and_the_end_of_connections_are_taken_over(imported, polled):
     paced = "type: tcp\nhost: here\nport: 502\ndelay: 1\nmessage_wait_milliseconds: 30\nclose_comm_on_error: true\nsensors:\n- {name: a, address: 1}\n"
     file, said = imported("homeassistant", paced)
-    assert said == "" and head_of(file).endswith("interval: 15s\ndelay: 1s\nmessage_wait: 30ms\nclose: error\n")
+    assert said == "" and head_of(file).endswith("interval: 15s\ndelay: 1s\nmessage_wait: 30ms\nclose: error\ntimeout: 5s\n")
     assert polled(file) == {"a": number(1, sign=True)}
     file, said = imported("telegraf", PLUGIN + """\
   [inputs.modbus.workarounds]
@@ -267,6 +267,14 @@ def plugin(lines):
     return f'[[inputs.modbus]]\ncontroller = "tcp://here"\nholding_registers = [{{name="right", address=[0]}},\n{lines}]\n'
 
 
+@pytest.mark.parametrize("whose, text, head", [
+    ("homeassistant", hub("timeout: 5"), "timeout: 5s\n"), ("homeassistant", hub("timeout: 0.25"), "timeout: 250ms\n"),
+    ("telegraf", plugin("") + 'timeout = "3s"\n', "timeout: 3s\n")])
+def test_the_timeout_becomes_a_key_of_the_device_file(imported, polled, whose, text, head):
+    file, _ = imported(whose, text)
+    assert head in open(file).read() and polled(file)
+
+
 @pytest.mark.parametrize("whose, text, sentence", [
     ("homeassistant", hub("- {name: a, address: 1, min_value: 3}"), "6: a: min_value is not taken over."),
     ("homeassistant", hub("- {name: a, address: 1, data_type: custom, structure: '>2h'}"),
@@ -277,7 +285,7 @@ def plugin(lines):
      "6: a: device_class: energy does not go with the unit_of_measurement W"),
     ("homeassistant", hub("- {name: Right, address: 1}"), '6: Right: the name is "Right 2" here: another field has it.'),
     ("homeassistant", hub("- {name: a, address: 1, data_type: int32, count: 1}"), "6: a: count 1 is not the 2 registers of int32."),
-    ("homeassistant", hub("timeout: 5"), "6: timeout: it is an option of the commands: --timeout 5s."),
+    ("homeassistant", hub("timeout: 5000"), "6: timeout: a timeout is from 1ms to 1000s."),
     ("homeassistant", hub("retries: 5"), "6: the hub: retries is not taken over."),
     ("homeassistant", hub("climates:\n- {name: a, address: 1, target_temp_register: 2, hvac_mode_register: {address: 3, values: {state_off: [0, 4]}}}"),
      "7: a mode: state_off: only 0 of several numbers."),
@@ -285,7 +293,7 @@ def plugin(lines):
     ("telegraf", plugin('{name="a", data_type="INT32", address=[1, 3]}'), "4: a: its addresses do not follow each other: the field is left out."),
     ("telegraf", plugin('{name="a", data_type="INT32", address=[1]}'), "4: a: INT32 has 2 registers and not 1."),
     ("telegraf", plugin('{name="a", color="red", address=[1]}'), "4: a: color is not taken over."),
-    ("telegraf", plugin("") + 'timeout = "3s"\n', "5: timeout: it is an option of the commands: --timeout 3s."),
+    ("telegraf", plugin("") + 'timeout = "1m30s"\n', '5: timeout: "1m30s" is not a time'),
     ("sunspec", MODEL.replace('"pad"', '"eui48"'), "6: Pad: the type eui48 has no counterpart: the field is left out."),
     ("sunspec", MODEL.replace('"count": 2', '"count": 0'),
      "13: stage: the device says how often it is there: give that with --count. One is taken."),

@@ -2,6 +2,7 @@
 connection, that are busy, and that are unit 0: by the name of a line, by options, and by the keys of files. Each is a device that
 people have reported; the test's comment says where."""
 
+import signal
 import time
 
 import pytest
@@ -207,6 +208,31 @@ def test_a_busy_device_is_asked_again(mbm, write):
     assert mbm("poll", device.line, file, "--once", *QUICK).code == DONE and len(device.asked) == 4
 
 
+@pytest.mark.parametrize("where", ["name", "option", "device", "gateway", "gateway line"])
+def test_a_reply_may_take_as_long_as_timeout_says(mbm, write, where):
+    """Longer than the second of the default. Home Assistant's hub waits five."""
+    device = Device(late=1.3)
+    if where.startswith("gateway"):
+        head, line = ("timeout: 20s\n", "") if where == "gateway" else ("timeout: 100ms\n", ", timeout: 20s")
+        file = write("g.yaml", f"listen: tcp://127.0.0.1:0\n{head}lines:\n- {{line: '{device.line}', units: 9{line}}}\n")
+        assert Client(mbm.begin("gateway", file).last_word()).ask(9, bytes([3, 0, 5, 0, 1])) == number(5)
+        return
+    line = device.line + ("?timeout=20s" if where == "name" else "")
+    options = ("--timeout", "20s") if where == "option" else ()
+    if where != "device":
+        assert mbm("read", line, 7, *options).out == "    7  7\n"
+    file = write("d.yaml", ("timeout: 20s\n" if where == "device" else "") + FIELDS)
+    assert mbm("poll", line, file, "--once", *options).code == DONE
+
+
+def test_a_failure_names_the_time_that_was_in_force(mbm, write):
+    device = Device(silent=lambda turn: True)
+    line = device.line + "?timeout=30ms"
+    assert "within 30ms" in mbm("read", line, 7, "--timeout", "20s").error
+    assert "within 40ms" in mbm("poll", device.line, write("d.yaml", "timeout: 40ms\n" + FIELDS), "--once").error
+    assert "within 50ms" in mbm("poll", device.line, write("d.yaml", "timeout: 20s\n" + FIELDS), "--once", "--timeout", "50ms").error
+
+
 # --- connections: few places (telegraf 8225), closed after each answer (HA 101982, evcc 14275), deaf until a new one (evcc 23395)
 
 def test_a_connection_is_closed_after_each_round(mbm, write):
@@ -249,16 +275,17 @@ SHY_FIELDS = ("unit: 9\ninterval: 200ms\nfields:\n- {name: a, table: holding, ad
               "- {name: b, table: holding, address: 300, type: uint16, value: 8, access: read-write}\n")
 
 
-@pytest.mark.parametrize("where", ["device", "line", "name", "nowhere"])
+@pytest.mark.parametrize("where", ["device", "line", "head", "name", "nowhere"])
 def test_a_bridge_reaches_a_device_as_its_keys_say(mbm, folder, write, where):
-    """The keys are in the device file, in the file of the bridge, or in the name of the line."""
+    """The keys are in the device file, in the file of the bridge at the line or at its head, or in the name of the line."""
     place = mbm.serve("tcp://127.0.0.1:0", write("served.yaml", SHY_FIELDS), *(word for fault in SHY for word in ("--fault", fault)))
     broker = Broker(folder).come()
     device = write("d.yaml", "".join(f"{key}\n" for key in SHY_KEYS if where == "device") + SHY_FIELDS)
     keys = "".join(f", {key}" for key in SHY_KEYS if where == "line")
     if where == "name":
         place += "?accept=unit,transaction&delay=600ms&message_wait=80ms&busy_retries=1&busy_wait=10ms&retries=1"
-    file = write("b.yaml", f"broker: {broker.place}\ntopic: hall\nlines:\n- {{line: '{place}', topic: shy, file: {device}{keys}}}\n")
+    head = "".join(f"{key}\n" for key in SHY_KEYS if where == "head")
+    file = write("b.yaml", f"broker: {broker.place}\ntopic: hall\n{head}lines:\n- {{line: '{place}', topic: shy, file: {device}{keys}}}\n")
     subscriber = Subscriber(broker)
     mbm.begin("bridge", file, "--timeout", "1s")
     if where == "nowhere":
@@ -270,6 +297,27 @@ def test_a_bridge_reaches_a_device_as_its_keys_say(mbm, folder, write, where):
     subscriber.expect_last("hall/shy/unit/9/status", "online")
     subscriber.expect_result("hall/shy/b", "40", "success")
     subscriber.expect_value("hall/shy/b", 40)
+
+
+@pytest.mark.parametrize("where", ["device", "line", "head"])
+def test_a_bridge_waits_as_long_as_timeout_says_and_reads_it_again(mbm, folder, write, where):
+    """The device answers after 0.4 s: not within 100 ms, but after SIGHUP, with another timeout, it does."""
+    device, broker = Device(late=0.4), Broker(folder).come()
+    subscriber = Subscriber(broker)
+
+    def files(timeout):
+        key = {where: f"timeout: {timeout}"}
+        fields = write("d.yaml", key.get("device", "") + "\nunit: 9\ninterval: 100ms\n" + FIELDS)
+        line = f"{{line: '{device.line}', topic: slow, file: {fields}, {key.get('line', '')}}}"
+        return write("b.yaml", f"broker: {broker.place}\ntopic: hall\n{key.get('head', '')}\nlines:\n- {line}\n")
+
+    # An option counts before the device file, and after the file of the bridge.
+    bridge = mbm.begin("bridge", files("100ms"), *(() if where == "device" else ("--timeout", "20s")))
+    subscriber.expect_last("hall/slow/unit/9/status", "offline")
+    files("20s")
+    bridge.process.send_signal(signal.SIGHUP)
+    subscriber.expect_last("hall/slow/unit/9/status", "online")
+    subscriber.expect_value("hall/slow/a", 0)
 
 
 def test_a_bridge_closes_the_connection_after_each_round(mbm, folder, write):
@@ -336,6 +384,10 @@ def test_a_device_with_unit_0_is_served_over_tcp(mbm, write):
     ("retries: 255", "retries"),
     ("busy_retries: -1", "busy_retries"),
     ("busy_wait: 10ms", "busy_wait needs busy_retries"),
+    ("timeout: 5", 'timeout: "5" is not a time'),
+    ("timeout: 0s", 'timeout: "0s" is out of range: from 1ms to 1000s is allowed'),
+    ("timeout: 1001s", 'timeout: "1001s" is out of range'),
+    ("timeout: [1s]", "timeout"),
     ("unit: 256", "unit"),
 ])
 def test_a_wrong_value_is_refused_with_file_and_line(plain, write, device, key, sentence):
@@ -352,12 +404,17 @@ def test_keys_of_the_files_of_gateway_and_bridge_are_refused_with_their_line(pla
         ("listen: tcp://:0\nlines:\n- {line: 'rtu:/dev/x', units: 1, accept: unit}\n", "g.yaml:3: accept is for tcp://"),
         ("listen: tcp://:0\nlines:\n- {line: 'tcp://h', units: 1, accept: transaction, in_flight: 2}\n",
          "g.yaml:3: accept transaction needs one request in flight: in_flight is 2"),
+        ("listen: tcp://:0\ntimeout: 1\nlines:\n- {line: 'tcp://h', units: 1}\n", 'g.yaml:2: timeout: "1" is not a time'),
+        ("listen: tcp://:0\nlines:\n- {line: 'tcp://h', units: 1, timeout: 0ms}\n", 'g.yaml:3: timeout: "0ms" is out of range'),
         ("listen: tcp://:0\nmessage_wait: 1\nlines:\n- {line: 'tcp://h', units: 1}\n", "g.yaml:2: message_wait"),
     ]:
         plain.fails(WRONG, sentence, "gateway", write("g.yaml", text), "--check")
     for text, sentence in [
         (f"lines:\n- {{line: 'tcp://h', file: {device}, close: often}}\n", 'b.yaml:2: close: "often"'),
         (f"lines:\n- {{line: 'rtu:/dev/x', file: {device}, accept: unit}}\n", "b.yaml:2: accept is for tcp://"),
+        (f"lines:\n- {{line: 'tcp://h', file: {device}, timeout: 1}}\n", 'b.yaml:2: timeout: "1" is not a time'),
+        (f"timeout: 1h\nlines:\n- {{line: 'tcp://h', file: {device}}}\n", 'b.yaml:1: timeout: "1h" is out of range: from 1ms to 1000s'),
+        (f"busy_wait: 1s\nlines:\n- {{line: 'tcp://h', file: {device}}}\n", "b.yaml:1: busy_wait needs busy_retries"),
         (f"lines:\n- {{line: 'udp://h', file: {device}, delay: 1s}}\n", "b.yaml:2: delay is not for udp://"),
     ]:
         plain.fails(WRONG, sentence, "bridge", write("b.yaml", text), "--check")
