@@ -1,7 +1,7 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::indication::{SERIAL, STREAM};
-use super::line::{Receive, Server, ServerStorage};
+use super::line::{OwnOfFraming, Receive, Server, ServerStorage, READ_AHEAD};
 use super::{Indication, Reply, Units};
 use crate::error::{Error, Status};
 use crate::frame::ascii::{CharacterKind, Decoded};
@@ -39,10 +39,6 @@ const MIN_TCP: usize = tcp::PDU + 1;
 /// requests, so that one call of the port is enough. [`Server::keep_read_ahead`] can store
 /// bytes that belong to the next frame.
 const FIRST_READ: usize = MIN_TCP + READ_AHEAD;
-
-/// Most bytes of the next frame that the server has read. The shortest frame buffer has space
-/// for as many after each frame that is shorter than [`FIRST_READ`].
-const READ_AHEAD: usize = 4;
 
 /// Bytes of an RTU buffer that are free for the PDU. They may be more than the longest PDU: a
 /// user-defined function may keep its request there while it writes the response after it.
@@ -512,12 +508,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Stores the bytes after a frame of `length` bytes, which is shorter than [`FIRST_READ`]. They
-    /// belong to the next frame. They are stored in `receive_latency`, which TCP does not use as a time.
+    /// belong to the next frame.
     #[inline(always)]
     fn keep_read_ahead(&mut self, length: usize) {
         self.read_ahead = self.end as u8 - length as u8;
         if let [a, b, c, d] = *self.storage.slice(length, READ_AHEAD) {
-            self.receive_latency = u32::from_ne_bytes([a, b, c, d]);
+            self.own_of_framing = OwnOfFraming::read_ahead([a, b, c, d]);
         }
     }
 
@@ -525,7 +521,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(always)]
     fn use_read_ahead(&mut self) {
         if let Some(front) = self.storage.bytes(0, READ_AHEAD).first_chunk_mut() {
-            *front = self.receive_latency.to_ne_bytes();
+            *front = self.own_of_framing.as_read_ahead();
         }
         self.end = self.read_ahead.into();
         self.read_ahead = 0;

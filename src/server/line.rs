@@ -69,6 +69,38 @@ pub(super) type Receive<P, B> = fn(&mut Server<P, B>) -> Status;
 /// Turns the response PDU in the buffer, of this length, into a frame. Returns its length.
 pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 
+/// Most bytes of the next frame that the server has read. The shortest frame buffer has space
+/// for as many after each frame that is shorter than what the server reads first.
+pub(super) const READ_AHEAD: usize = 4;
+
+/// What only one kind of framing keeps: a serial line the receive latency (see
+/// [`Server::set_receive_latency`]), TCP the bytes of the next frame, which were read with the last
+/// one. (A field for each takes 4 bytes of RAM more in each server.)
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OwnOfFraming(u32);
+
+impl OwnOfFraming {
+    /// That of a serial line.
+    pub(super) const fn latency(latency: Micros) -> OwnOfFraming {
+        OwnOfFraming(latency)
+    }
+
+    /// The latency of a serial line.
+    pub(super) fn as_latency(self) -> Micros {
+        self.0
+    }
+
+    /// That of a TCP connection.
+    pub(super) fn read_ahead(bytes: [u8; READ_AHEAD]) -> OwnOfFraming {
+        OwnOfFraming(u32::from_ne_bytes(bytes))
+    }
+
+    /// The bytes of the next frame of a TCP connection.
+    pub(super) fn as_read_ahead(self) -> [u8; READ_AHEAD] {
+        self.0.to_ne_bytes()
+    }
+}
+
 /// A server on one line or connection.
 // The small fields come first: see `Engine`.
 #[repr(C)]
@@ -98,16 +130,14 @@ pub struct Server<P, B> {
     pub storage: B,
     /// The end character of ASCII frames.
     pub(super) delimiter: u8,
-    /// Over TCP: how many bytes of the next frame are stored in `receive_latency`.
+    /// Over TCP: how many bytes of the next frame are stored in `own_of_framing`.
     pub(super) read_ahead: u8,
     /// On an RTU line: the length of a character in microseconds.
     pub(super) character: Micros16,
     pub(super) now: Micros,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
     pub silence: Micros,
-    /// See [`Server::set_receive_latency`]. Over TCP, which has no latency, it holds the bytes of the
-    /// next frame: a field for them takes 4 bytes of RAM more in each server.
-    pub(super) receive_latency: Micros,
+    pub(super) own_of_framing: OwnOfFraming,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.
@@ -133,7 +163,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             deadline: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,
-            receive_latency: RECEIVE_LATENCY,
+            own_of_framing: OwnOfFraming::latency(RECEIVE_LATENCY),
             receive: None,
             encode_adu: None,
             storage,
@@ -172,7 +202,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.has_no_echo = false;
         self.sent = 0;
         self.character = UNKNOWN_CHARACTER;
-        self.receive_latency = RECEIVE_LATENCY;
+        self.own_of_framing = OwnOfFraming::latency(RECEIVE_LATENCY);
         self.listen();
     }
 
@@ -205,7 +235,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// this time.
     pub fn set_receive_latency(&mut self, milliseconds: u16) {
         if self.keeps_time() {
-            self.receive_latency = time::millis(milliseconds);
+            self.own_of_framing = OwnOfFraming::latency(time::millis(milliseconds));
         }
     }
 
@@ -328,7 +358,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.is_waiting = true;
         self.deadline = start;
         time::add_characters(&mut self.deadline, count + FIFO_TIMEOUT, self.character);
-        self.deadline = self.deadline.wrapping_add(self.receive_latency);
+        self.deadline = self.deadline.wrapping_add(self.own_of_framing.as_latency());
     }
 
     /// Notes that the line has no echo: after a response, another frame than its echo has come,
