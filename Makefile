@@ -118,6 +118,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check/header
 	@$(MAKE) --no-print-directory check-comments
 	@scripts/check/functions
+	@CARGO="$(CARGO)" scripts/check/names
 	@scripts/check/packages
 	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
