@@ -18,14 +18,18 @@
 //! let mut master = Master::new(17, uart, buffers);
 //! master.settings().set_baud_rate(9600);
 //!
-//! master.read_holding_registers(107, 2)?;
-//! master.wait(|| { /* The firmware does its other work here. */ })?;
+//! assert_eq!(master.holding_registers(107)?, [555, 100]);
+//!
+//! // Without waiting:
+//! master.start_read_holding_registers(107, 2)?;
+//! while master.poll().is_pending() { /* The firmware does its other work here. */ }
 //! assert_eq!(master.response(), [555, 100]);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready`.
+//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready` with the
+//! result of the request.
 //! Functions return `Result` with [`Error`].
 //!
 //! # A port

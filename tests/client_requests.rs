@@ -3,9 +3,8 @@
 mod common;
 
 use common::uart::{Bench, Wire};
-use mbm::client::{Client, Frame, Request, RequestState, Serial};
+use mbm::client::{Client, Frame, Request, Serial};
 use mbm::error::Error;
-use mbm::pdu::functions::FunctionSpec;
 use mbm::port::Port;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -160,26 +159,16 @@ fn a_request_that_failed_has_read_nothing() {
 }
 
 #[test]
-fn a_function_without_a_constructor_takes_and_returns_bytes() {
+fn a_queue_and_the_words_of_a_query_arrive_in_slices() {
     let mut bench = Bench::new();
-    let mut queue = [0; 64];
-    let read = |state: &mut RequestState| state.set(FunctionSpec::READ_FIFO_QUEUE, 0x04DE, 0);
-    let fifo = Request::of_bytes(17, read, &mut [], &mut queue);
-    let ended = ask(&mut bench, fifo);
-    assert_eq!(ended.bytes(), [0x01, 0xB8, 0x12, 0x84]);
-    let mut data = [0xA5, 0x37];
-    let mut echo = [0; 2];
-    let query = |state: &mut RequestState| state.diagnostics(0, 1);
-    let ended = ask(
-        &mut bench,
-        Request::of_bytes(17, query, &mut data, &mut echo),
-    );
-    assert_eq!(ended.bytes(), [0xA5, 0x37]);
-    let refused = Request::of_bytes(17, query, &mut data[..1], &mut []).err();
-    assert_eq!(refused, Some(Error::InvalidArgument));
-    let beyond = |state: &mut RequestState| state.set(FunctionSpec::READ_COILS, 0xFFFF, 2);
-    let refused = Request::of_bytes(17, beyond, &mut [], &mut []).err();
-    assert_eq!(refused, Some(Error::InvalidAddress));
+    let mut queue = [0; 31];
+    let ended = ask(&mut bench, Request::read_fifo_queue(17, 0x04DE, &mut queue));
+    assert_eq!(ended.registers(), [0x01B8, 0x1284]);
+    let (mut data, mut echo) = ([0xA537], [0]);
+    let query = Request::diagnostics(17, 0, &mut data, &mut echo);
+    assert_eq!(ask(&mut bench, query).registers(), [0xA537]);
+    let refused = Request::diagnostics(17, 0, &mut [1, 2], &mut [0]).err();
+    assert_eq!(refused, Some(Error::BufferTooSmall));
 }
 
 #[test]

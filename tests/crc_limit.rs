@@ -191,7 +191,10 @@ fn read(registers: usize, frame: &[u8]) -> Option<Vec<u16>> {
         is_sent: false,
     };
     let mut master = Master::new(17, line, Buffers::new([0; 256], [0; 125], [0; 1]));
-    assert_eq!(master.read_holding_registers(0, registers as u16), Ok(()));
+    assert_eq!(
+        master.start_read_holding_registers(0, registers as u16),
+        Ok(())
+    );
     for _ in 0..10_000 {
         if let Poll::Ready(result) = master.poll() {
             return result.is_ok().then(|| master.response().to_vec());

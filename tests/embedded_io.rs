@@ -92,7 +92,7 @@ fn master<P: Port>(port: P) -> Master<P, Words> {
 /// Reads three registers.
 fn read(bench: &mut Bench, port: impl Port) -> Result<Vec<u16>, Error> {
     let mut master = master(port);
-    master.read_holding_registers(102, 3)?;
+    master.start_read_holding_registers(102, 3)?;
     master.wait(|| bench.pass())?;
     Ok(master.response().to_vec())
 }
@@ -112,7 +112,7 @@ fn the_driver_is_on_until_the_last_byte_has_left_and_off_before_the_reply() {
         bench.wire.borrow_mut().accepts = accepts;
         let mut master = master(serial(&bench));
         let words = [7; 10];
-        assert_eq!(master.write_multiple_registers(100, &words), Ok(()));
+        assert_eq!(master.start_write_multiple_registers(100, &words), Ok(()));
         let mut times = [0; 2];
         let result = master.wait(|| {
             let wire = bench.wire.borrow();
@@ -206,7 +206,7 @@ fn a_device_that_receives_nothing_times_out() {
     let mut bench = Bench::new();
     bench.wire.borrow_mut().is_cut = true;
     let mut master = master(serial(&bench));
-    assert_eq!(master.write_single_register(100, 1), Ok(()));
+    assert_eq!(master.start_write_single_register(100, 1), Ok(()));
     assert_eq!(master.wait(|| bench.pass()), Err(Error::ResponseTimedOut));
     assert_eq!(master.status(), Status::RESPONSE_TIMED_OUT);
 }

@@ -308,7 +308,7 @@ impl Reader<'_> {
             Reader::Master(master) => {
                 master.set_unit(unit);
                 master.settings().response_timeout = MicrosSetting::new(timeout);
-                master.read_holding_registers(address, 1).unwrap();
+                master.start_read_holding_registers(address, 1).unwrap();
                 loop {
                     if let std::task::Poll::Ready(result) = master.poll() {
                         let word = master.response().first().copied().unwrap_or_default();

@@ -6,7 +6,7 @@ mod frame;
 use frame::sealed;
 use mbm::engine::Buffers;
 use mbm::engine::Counter;
-use mbm::error::Status;
+use mbm::error::{Error, Status};
 use mbm::master::Master;
 use mbm::port::Port;
 
@@ -17,6 +17,7 @@ struct Wire {
     sent: Vec<u8>,
     reply: Vec<u8>,
     arriving: Vec<u8>,
+    idled: u32,
 }
 
 impl Port for Wire {
@@ -37,6 +38,11 @@ impl Port for Wire {
     fn micros(&mut self) -> u32 {
         self.now = self.now.wrapping_add(100);
         self.now
+    }
+
+    fn idle(&mut self, micros: u32) {
+        self.idled += 1;
+        self.now = self.now.wrapping_add(micros);
     }
 }
 
@@ -62,7 +68,7 @@ fn finish(master: &mut Master<Wire, Lent>) -> Status {
 #[test]
 fn registers_are_read_into_the_response_words() {
     let mut master = master(&sealed(&[7, 3, 4, 0x12, 0x34, 0x56, 0x78]));
-    assert_eq!(master.read_holding_registers(0x6B, 2), Ok(()));
+    assert_eq!(master.start_read_holding_registers(0x6B, 2), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
     assert_eq!(master.port().sent, sealed(&[7, 3, 0, 0x6B, 0, 2]));
     assert_eq!(master.response(), [0x1234, 0x5678]);
@@ -71,7 +77,7 @@ fn registers_are_read_into_the_response_words() {
 #[test]
 fn unused_bits_of_the_last_word_are_zero_even_if_the_device_sets_them() {
     let mut master = master(&sealed(&[7, 1, 3, 0xFF, 0xFF, 0xFF]));
-    assert_eq!(master.read_coils(0, 17), Ok(()));
+    assert_eq!(master.start_read_coils(0, 17), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
     assert_eq!(master.response(), [0xFFFF, 1]);
     assert!(master.response_bits().eq([true; 17]));
@@ -83,7 +89,7 @@ fn noise_and_a_frame_of_another_unit_are_counted_and_skipped() {
     bytes.extend([0, 0, 0]);
     bytes.extend(sealed(&[7, 6, 0, 1, 0, 3]));
     let mut master = master(&bytes);
-    assert_eq!(master.write_single_register(1, 3), Ok(()));
+    assert_eq!(master.start_write_single_register(1, 3), Ok(()));
     assert_eq!(finish(&mut master), Status::OK);
     let counters = master.storage().counters;
     assert_eq!(counters[Counter::ForeignFrames as usize], 1);
@@ -97,7 +103,7 @@ fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end
     // The frame of unit 8 contains 07 06, which looks like the start of the expected reply.
     let bytes = sealed(&[8, 3, 8, 7, 6, 0, 0, 0, 0, 0, 0]);
     let mut master = master(&bytes);
-    assert_eq!(master.write_single_register(1, 3), Ok(()));
+    assert_eq!(master.start_write_single_register(1, 3), Ok(()));
     assert_eq!(finish(&mut master), Status::INVALID_SLAVE_ID);
 }
 
@@ -105,7 +111,7 @@ fn data_that_look_like_a_damaged_reply_inside_a_frame_of_another_unit_do_not_end
 fn a_request_that_is_answered_after_one_retry_succeeds() {
     let mut master = master(&[]);
     master.settings().retries = 1;
-    assert_eq!(master.write_single_coil(5, true), Ok(()));
+    assert_eq!(master.start_write_single_coil(5, true), Ok(()));
     while master.storage().counters[Counter::Timeouts as usize] == 0 {
         assert!(master.poll().is_pending());
     }
@@ -131,7 +137,7 @@ fn a_reply_at_the_end_of_the_buffer_is_not_taken_for_an_echo() {
         // The master expects an echo, but none arrives.
         master.settings().echo_discard = true;
         let read = registers as u16;
-        let started = master.read_write_multiple_registers(0x6B, read, 1, &[9]);
+        let started = master.start_read_write_multiple_registers(0x6B, read, 1, &[9]);
         assert_eq!(started, Ok(()));
         while master.poll().is_pending() {}
         assert_eq!(master.status(), Status::OK);
@@ -182,9 +188,38 @@ fn the_gap_counts_from_the_last_byte_although_one_poll_receives_them_all() {
     };
     let mut master = Master::new(7, port, Buffers::new([0; 256], [0; 125], [0; 123]));
     for _ in 0..2 {
-        assert_eq!(master.read_holding_registers(0, 10), Ok(()));
+        assert_eq!(master.start_read_holding_registers(0, 10), Ok(()));
         while !master.poll().is_ready() {}
         assert_eq!(master.status(), Status::OK);
     }
     assert!((4000..4400).contains(&master.port().silence));
+}
+
+#[test]
+fn a_call_that_waits_fills_a_slice_or_an_array_and_lets_the_port_idle() {
+    let reply = sealed(&[7, 3, 4, 0x12, 0x34, 0x56, 0x78]);
+    let mut master = master(&reply);
+    assert_eq!(master.holding_registers(0x6B), Ok([0x1234, 0x5678]));
+    assert_eq!(master.port().sent, sealed(&[7, 3, 0, 0x6B, 0, 2]));
+    let mut words = [0; 2];
+    assert_eq!(master.read_holding_registers(0x6B, &mut words), Ok(()));
+    assert_eq!(words, [0x1234, 0x5678]);
+    assert!(master.port().idled > 0);
+}
+
+#[test]
+fn a_reply_with_fewer_data_than_were_requested_fills_nothing_even_of_a_lenient_master() {
+    let reply = sealed(&[7, 3, 2, 0x12, 0x34]);
+    let mut master = master(&reply);
+    master.set_lenient(true);
+    let mut words = [9; 2];
+    assert_eq!(
+        master.read_holding_registers(0x6B, &mut words),
+        Err(Error::MalformedReply)
+    );
+    assert_eq!(words, [9; 2]);
+    // A program that wants what there is starts the request.
+    assert_eq!(master.start_read_holding_registers(0x6B, 2), Ok(()));
+    assert_eq!(finish(&mut master), Status::OK);
+    assert_eq!(master.response(), [0x1234]);
 }

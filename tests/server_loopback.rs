@@ -127,35 +127,37 @@ impl Loop {
 #[test]
 fn every_function_of_the_master_is_answered() {
     let mut line = Loop::new();
-    let started = line.master.read_holding_registers(100, 10);
+    let started = line.master.start_read_holding_registers(100, 10);
     assert_eq!(line.finish(started), Status::OK);
     assert_eq!(line.master.response()[9], 0x1009);
-    let started = line.master.read_input_registers(100, 10);
+    let started = line.master.start_read_input_registers(100, 10);
     assert_eq!(line.finish(started), Status::OK);
     assert_eq!(line.master.response()[9], 0x2009);
-    let started = line.master.read_coils(100, 20);
+    let started = line.master.start_read_coils(100, 20);
     assert_eq!(line.finish(started), Status::OK);
     assert_eq!(line.master.response()[0], 0x9249);
-    let started = line.master.read_discrete_inputs(100, 20);
+    let started = line.master.start_read_discrete_inputs(100, 20);
     assert_eq!(line.finish(started), Status::OK);
     assert_eq!(line.master.response()[1], 0b1011);
-    let started = line.master.write_single_register(100, 7);
+    let started = line.master.start_write_single_register(100, 7);
     assert_eq!(line.finish(started), Status::OK);
-    let started = line.master.write_single_coil(101, true);
-    assert_eq!(line.finish(started), Status::OK);
-    let started = line.master.write_multiple_registers(103, &[0xABCD, 0x1234]);
-    assert_eq!(line.finish(started), Status::OK);
-    let started = line.master.write_multiple_coils(104, &[true; 16]);
-    assert_eq!(line.finish(started), Status::OK);
-    let started = line.master.mask_write_register(100, 0, 0x0FF0);
+    let started = line.master.start_write_single_coil(101, true);
     assert_eq!(line.finish(started), Status::OK);
     let started = line
         .master
-        .read_write_multiple_registers(100, 4, 102, &[0xABCD]);
+        .start_write_multiple_registers(103, &[0xABCD, 0x1234]);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line.master.start_write_multiple_coils(104, &[true; 16]);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line.master.start_mask_write_register(100, 0, 0x0FF0);
+    assert_eq!(line.finish(started), Status::OK);
+    let started = line
+        .master
+        .start_read_write_multiple_registers(100, 4, 102, &[0xABCD]);
     assert_eq!(line.finish(started), Status::OK);
     assert_eq!(line.master.response(), [0x0FF0, 0x1001, 0xABCD, 0xABCD]);
     assert_eq!(line.device.holding[4], 0x1234);
-    let started = line.master.read_holding_registers(110, 1);
+    let started = line.master.start_read_holding_registers(110, 1);
     assert_eq!(line.finish(started), Status::ILLEGAL_DATA_ADDRESS);
 }
 
@@ -169,7 +171,9 @@ fn a_bad_wire_makes_requests_fail_but_never_gives_a_wrong_value() {
         value.copy_from_slice(&line.device.holding);
         for round in 0..500u16 {
             let cell = usize::from(round % 10);
-            let started = line.master.write_single_register(100 + round % 10, round);
+            let started = line
+                .master
+                .start_write_single_register(100 + round % 10, round);
             let wrote = line.finish(started);
             if wrote == Status::OK {
                 value[cell] = round;
@@ -178,7 +182,7 @@ fn a_bad_wire_makes_requests_fail_but_never_gives_a_wrong_value() {
             let held = line.device.holding[cell];
             assert!(held == value[cell] || (wrote != Status::OK && held == round));
             value[cell] = held;
-            let started = line.master.read_holding_registers(100, 10);
+            let started = line.master.start_read_holding_registers(100, 10);
             if line.finish(started) == Status::OK {
                 right += 1;
                 for (at, wanted) in value.iter().enumerate() {
@@ -195,10 +199,10 @@ fn after_the_wire_is_good_again_the_next_request_is_answered() {
     let mut line = Loop::new();
     for round in 0..200 {
         line.wire.borrow_mut().changed = 6;
-        let started = line.master.read_holding_registers(100, 10);
+        let started = line.master.start_read_holding_registers(100, 10);
         let _ = line.finish(started);
         line.wire.borrow_mut().changed = 0;
-        let started = line.master.read_holding_registers(100, 10);
+        let started = line.master.start_read_holding_registers(100, 10);
         assert_eq!(line.finish(started), Status::OK, "{round}");
     }
 }

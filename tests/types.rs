@@ -150,11 +150,11 @@ fn a_frame_buffer_of_13_bytes_and_the_words_holds_every_request() {
         let buffers = Buffers::new(vec![0; 13 + 2 * words], vec![0; words], vec![0; words]);
         let mut master = Master::new(17, EmbeddedIo::serial(Uart, micros as fn() -> u32), buffers);
         let (quantity, values) = (words as u16, vec![7; words]);
-        assert_eq!(master.read_holding_registers(0, quantity), Ok(()));
+        assert_eq!(master.start_read_holding_registers(0, quantity), Ok(()));
         master.cancel();
-        assert_eq!(master.write_multiple_registers(0, &values), Ok(()));
+        assert_eq!(master.start_write_multiple_registers(0, &values), Ok(()));
         master.cancel();
-        let both = master.read_write_multiple_registers(0, quantity, 0, &values);
+        let both = master.start_read_write_multiple_registers(0, quantity, 0, &values);
         assert_eq!(both, Ok(()));
     }
 }

@@ -49,9 +49,9 @@ static void the_firmware_ends_without_an_error(void **state)
     assert_int_equal(done.code, 0);
 }
 
-static void a_polled_master_reads_two_registers(void **state)
+static void a_blocking_master_reads_two_registers(void **state)
 {
-    printed("polled", server_pattern(20), server_pattern(21));
+    printed("blocking", server_pattern(20), server_pattern(21));
 }
 
 static void an_awaited_master_writes_a_register_and_reads_two(void **state)
@@ -64,7 +64,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_firmware_ends_without_an_error),
-        cmocka_unit_test(a_polled_master_reads_two_registers),
+        cmocka_unit_test(a_blocking_master_reads_two_registers),
         cmocka_unit_test(an_awaited_master_writes_a_register_and_reads_two),
     };
 

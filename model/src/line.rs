@@ -423,7 +423,7 @@ impl State {
         self.own_damaged = false;
         self.own_exception = false;
         self.master.set_unit(UNITS[self.current]);
-        if self.master.read_holding_registers(0, 1).is_err() {
+        if self.master.start_read_holding_registers(0, 1).is_err() {
             self.wrong = Some("a request was refused");
         }
     }

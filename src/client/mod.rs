@@ -5,6 +5,9 @@
 //! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
 //! between a request and a frame buffer.
 
+mod blocking;
+mod call;
+mod calls;
 mod lenient;
 mod link;
 mod policy;
@@ -17,6 +20,8 @@ mod tcp;
 mod transaction;
 mod units;
 
+pub use blocking::BlockingClient;
+pub use call::{Call, CommEventCounter, CommEventLog, ReadRecords, WriteRecords, CALL_BYTES};
 pub use link::{Link, LinkEvent, LinkHooks, LinkState, MOST_REPLACE_AFTER};
 #[doc(hidden)]
 pub use policy::{again, again_when_busy};

@@ -30,7 +30,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     }
 
     /// A serial line with ASCII frames.
-    pub fn ascii(port: P, storage: S) -> Self {
+    pub const fn ascii(port: P, storage: S) -> Self {
         let mut line = Serial::new(port, storage);
         line.set_ascii();
         line
@@ -38,7 +38,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 
     /// Changes the line to ASCII frames: no silence before a request, and one second
     /// without a character ends an incomplete frame.
-    pub fn set_ascii(&mut self) {
+    pub const fn set_ascii(&mut self) {
         self.engine.request().set_ascii(ascii::END);
         self.engine.settings.gap = MicrosSetting::new(0);
         self.engine.settings.silence = MicrosSetting::new(ASCII_SILENCE);
@@ -46,7 +46,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 
     /// Changes the line to a TCP stream: no silence before a request, and
     /// [`STREAM_SILENCE`] ends a frame.
-    pub fn set_stream(&mut self) {
+    pub const fn set_stream(&mut self) {
         self.engine.settings.gap = MicrosSetting::new(0);
         self.engine.settings.silence = MicrosSetting::new(STREAM_SILENCE);
     }
@@ -55,7 +55,7 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 impl<P: Port, S: ClientStorage, J: ClientRequest, const N: usize> Client<Serial<P, S, J>, J, N> {
     /// A client that sends RTU frames through a TCP stream, without a silence between
     /// frames and without broadcasts.
-    pub fn over_tcp(port: P, storage: S) -> Self {
+    pub const fn over_tcp(port: P, storage: S) -> Self {
         let mut client = Client::new(Serial::new(port, storage));
         client.queue.has_broadcast = false;
         client.line.set_stream();

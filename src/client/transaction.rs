@@ -33,7 +33,7 @@ pub struct ClientTransaction<P, S: ClientStorage, J> {
 
 impl<P: Port, S: ClientStorage, J: ClientRequest> ClientTransaction<P, S, J> {
     /// Sends requests in ASCII frames, which end with the character `delimiter`.
-    pub fn set_ascii(&mut self, delimiter: u8) {
+    pub const fn set_ascii(&mut self, delimiter: u8) {
         self.delimiter = delimiter;
         self.ascii = Some(Ascii {
             encode,

@@ -38,7 +38,7 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
     }
 
     /// The request that [`Engine::start`] sends.
-    pub fn request(&mut self) -> &mut Q {
+    pub const fn request(&mut self) -> &mut Q {
         &mut self.request
     }
 

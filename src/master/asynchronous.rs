@@ -1,8 +1,10 @@
 //! A master whose functions are futures, over the traits of embedded-io-async.
 
+use super::calls::{calls, quantity};
 use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;
+use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
 use core::future::{poll_fn, ready, Future};
 use core::pin::pin;
@@ -278,158 +280,15 @@ where
         }
     }
 
-    /// 01: reads 1 to 2000 coils, as many as `coils` has.
-    ///
-    /// # Errors
-    /// This and the other functions return an exception of the device, for example
-    /// [`Error::IllegalDataAddress`]; [`Error::ResponseTimedOut`], [`Error::InvalidCrc`],
-    /// [`Error::LinkLost`] or another error of the line. They send nothing if the standard
-    /// does not allow the quantity or the addresses ([`Error::InvalidQuantity`],
-    /// [`Error::InvalidAddress`]), or if the buffers cannot hold the data
-    /// ([`Error::BufferTooSmall`], [`Error::InvalidQuantity`]).
-    pub async fn read_coils(&mut self, address: u16, coils: &mut [bool]) -> Result<(), Error> {
-        let quantity = super::quantity(coils.len());
-        self.request(|master| master.read_coils(address, quantity))
-            .await?;
-        self.take_bits(coils);
-        Ok(())
+    fn take_words(&self, registers: &mut [u16]) -> Result<(), Error> {
+        self.master.take_words(registers)
     }
 
-    /// 02: reads 1 to 2000 discrete inputs, as many as `inputs` has.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn read_discrete_inputs(
-        &mut self,
-        address: u16,
-        inputs: &mut [bool],
-    ) -> Result<(), Error> {
-        let quantity = super::quantity(inputs.len());
-        self.request(|master| master.read_discrete_inputs(address, quantity))
-            .await?;
-        self.take_bits(inputs);
-        Ok(())
+    fn take_bits(&self, bits: &mut [bool]) -> Result<(), Error> {
+        self.master.take_bits(bits)
     }
 
-    /// 03: reads 1 to 125 holding registers, as many as `registers` has.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn read_holding_registers(
-        &mut self,
-        address: u16,
-        registers: &mut [u16],
-    ) -> Result<(), Error> {
-        let quantity = super::quantity(registers.len());
-        self.request(|master| master.read_holding_registers(address, quantity))
-            .await?;
-        self.take_words(registers);
-        Ok(())
-    }
-
-    /// 04: reads 1 to 125 input registers, as many as `registers` has.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn read_input_registers(
-        &mut self,
-        address: u16,
-        registers: &mut [u16],
-    ) -> Result<(), Error> {
-        let quantity = super::quantity(registers.len());
-        self.request(|master| master.read_input_registers(address, quantity))
-            .await?;
-        self.take_words(registers);
-        Ok(())
-    }
-
-    /// 05: switches one coil.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn write_single_coil(&mut self, address: u16, on: bool) -> Result<(), Error> {
-        self.request(|master| master.write_single_coil(address, on))
-            .await
-    }
-
-    /// 06: writes one register.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn write_single_register(&mut self, address: u16, value: u16) -> Result<(), Error> {
-        self.request(|master| master.write_single_register(address, value))
-            .await
-    }
-
-    /// 0F: writes 1 to 1968 coils.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn write_multiple_coils(
-        &mut self,
-        address: u16,
-        coils: &[bool],
-    ) -> Result<(), Error> {
-        self.request(|master| master.write_multiple_coils(address, coils))
-            .await
-    }
-
-    /// 10: writes 1 to 123 registers.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn write_multiple_registers(
-        &mut self,
-        address: u16,
-        registers: &[u16],
-    ) -> Result<(), Error> {
-        self.request(|master| master.write_multiple_registers(address, registers))
-            .await
-    }
-
-    /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn mask_write_register(
-        &mut self,
-        address: u16,
-        and_mask: u16,
-        or_mask: u16,
-    ) -> Result<(), Error> {
-        self.request(|master| master.mask_write_register(address, and_mask, or_mask))
-            .await
-    }
-
-    /// 17: writes 1 to 121 registers, then reads 1 to 125.
-    ///
-    /// # Errors
-    /// As [`AsyncMaster::read_coils`].
-    pub async fn read_write_multiple_registers(
-        &mut self,
-        (read_address, read): (u16, &mut [u16]),
-        (write_address, write): (u16, &[u16]),
-    ) -> Result<(), Error> {
-        let quantity = super::quantity(read.len());
-        self.request(|master| {
-            master.read_write_multiple_registers(read_address, quantity, write_address, write)
-        })
-        .await?;
-        self.take_words(read);
-        Ok(())
-    }
-
-    fn take_words(&self, registers: &mut [u16]) {
-        for (place, word) in registers.iter_mut().zip(self.master.response()) {
-            *place = *word;
-        }
-    }
-
-    fn take_bits(&self, bits: &mut [bool]) {
-        for (place, bit) in bits.iter_mut().zip(self.master.response_bits()) {
-            *place = bit;
-        }
-    }
+    calls! { async; .await }
 }
 
 /// A pending request. If the future that has it is dropped, the request is cancelled.

@@ -1,8 +1,11 @@
 //! A master of one serial line, for programs in Rust: the ten functions of the Arduino library
-//! ModbusMaster. Each function starts a request; [`Master::poll`] advances it to its end.
+//! ModbusMaster. [`Master::read_holding_registers`] and the like wait for the end of a request;
+//! [`Master::start_read_holding_registers`] and the like start one, and [`Master::poll`] advances it
+//! to its end.
 
 #[cfg(feature = "embedded-io-async")]
 mod asynchronous;
+mod calls;
 mod lenient;
 #[doc(hidden)]
 pub mod node;
@@ -17,7 +20,9 @@ pub use crate::engine::{
 };
 use crate::error::{Error, Status};
 use crate::pdu::functions::FunctionSpec;
+use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
+use calls::{calls, quantity};
 use core::task::Poll;
 use node::Node;
 use request::Line;
@@ -97,6 +102,28 @@ impl<P, S: Words> Master<P, S> {
         words.get(..count).unwrap_or_default()
     }
 
+    /// Copies the words that were read. A device of which a lenient master takes fewer has not answered.
+    fn take_words(&self, registers: &mut [u16]) -> Result<(), Error> {
+        if self.response().len() < registers.len() {
+            return Err(Error::MalformedReply);
+        }
+        for (place, word) in registers.iter_mut().zip(self.response()) {
+            *place = *word;
+        }
+        Ok(())
+    }
+
+    /// As [`Master::take_words`], for bits.
+    fn take_bits(&self, bits: &mut [bool]) -> Result<(), Error> {
+        if self.response_bits().count() < bits.len() {
+            return Err(Error::MalformedReply);
+        }
+        for (place, bit) in bits.iter_mut().zip(self.response_bits()) {
+            *place = bit;
+        }
+        Ok(())
+    }
+
     /// The coils or discrete inputs of the last successful read.
     pub fn response_bits(&self) -> impl Iterator<Item = bool> + '_ {
         let words = self.response().iter();
@@ -112,7 +139,7 @@ macro_rules! requests {
         $(#[$doc])*
         ///
         /// # Errors
-        /// As [`Master::read_coils`].
+        /// As [`Master::start_read_coils`].
         pub fn $name(&mut self, $($argument: $type),*) -> Result<(), Error> {
             self.start($call)
         }
@@ -195,6 +222,22 @@ impl<P: Port, S: Words> Master<P, S> {
         self.line.poll_delay(now)
     }
 
+    /// Makes a request, and waits until it has ended. Between two polls the port may sleep.
+    fn request(&mut self, start: impl FnOnce(&mut Self) -> Result<(), Error>) -> Result<(), Error> {
+        start(self)?;
+        loop {
+            if let Poll::Ready(result) = self.poll() {
+                return result;
+            }
+            if self.is_waiting() {
+                let delay = self.poll_delay();
+                self.line.port.idle(delay);
+            }
+        }
+    }
+
+    calls! { ; }
+
     /// Starts the request that `start` makes, if the line is ready.
     fn start(
         &mut self,
@@ -214,7 +257,7 @@ impl<P: Port, S: Words> Master<P, S> {
         }
     }
 
-    /// 01: reads 1 to 2000 coils into the response words.
+    /// 01: starts a request that reads 1 to 2000 coils into the response words.
     ///
     /// # Errors
     /// Nothing is sent then: [`Error::Busy`] while a request is pending;
@@ -222,55 +265,52 @@ impl<P: Port, S: Words> Master<P, S> {
     /// allow; [`Error::InvalidAddress`] for addresses beyond 65535;
     /// [`Error::BufferTooSmall`]; [`Error::BroadcastNotAllowed`];
     /// [`Error::NotInitialised`] if the port or the frame buffer cannot be used.
-    pub fn read_coils(&mut self, address: u16, quantity: u16) -> Result<(), Error> {
+    pub fn start_read_coils(&mut self, address: u16, quantity: u16) -> Result<(), Error> {
         self.start(request!(READ_COILS, address, quantity))
     }
 
     requests! {
-        /// 02: reads 1 to 2000 discrete inputs into the response words.
-        fn read_discrete_inputs(address: u16, quantity: u16)
+        /// 02: starts a request that reads 1 to 2000 discrete inputs into the response words.
+        fn start_read_discrete_inputs(address: u16, quantity: u16)
             => request!(READ_DISCRETE_INPUTS, address, quantity);
-        /// 03: reads 1 to 125 holding registers into the response words.
-        fn read_holding_registers(address: u16, quantity: u16)
+        /// 03: starts a request that reads 1 to 125 holding registers into the response words.
+        fn start_read_holding_registers(address: u16, quantity: u16)
             => request!(READ_HOLDING_REGISTERS, address, quantity);
-        /// 04: reads 1 to 125 input registers into the response words.
-        fn read_input_registers(address: u16, quantity: u16)
+        /// 04: starts a request that reads 1 to 125 input registers into the response words.
+        fn start_read_input_registers(address: u16, quantity: u16)
             => request!(READ_INPUT_REGISTERS, address, quantity);
-        /// 05: switches one coil.
-        fn write_single_coil(address: u16, on: bool)
+        /// 05: starts a request that switches one coil.
+        fn start_write_single_coil(address: u16, on: bool)
             => |node: &mut Node, line| node.write_single_coil(line, address, on.into());
-        /// 06: writes one register.
-        fn write_single_register(address: u16, value: u16)
+        /// 06: starts a request that writes one register.
+        fn start_write_single_register(address: u16, value: u16)
             => |node: &mut Node, line| node.write_single_register(line, address, value);
-        /// 0F: writes 1 to 1968 coils.
-        fn write_multiple_coils(address: u16, coils: &[bool])
+        /// 0F: starts a request that writes 1 to 1968 coils.
+        fn start_write_multiple_coils(address: u16, coils: &[bool])
             => |node: &mut Node, line| {
                 let quantity = put_bits(line, coils);
                 node.request(line, address, quantity, FunctionSpec::WRITE_MULTIPLE_COILS.short())
             };
-        /// 10: writes 1 to 123 registers.
-        fn write_multiple_registers(address: u16, words: &[u16])
+        /// 10: starts a request that writes 1 to 123 registers.
+        fn start_write_multiple_registers(address: u16, words: &[u16])
             => |node: &mut Node, line| {
                 let quantity = put_words(line, words);
                 let function = FunctionSpec::WRITE_MULTIPLE_REGISTERS.short();
                 node.request(line, address, quantity, function)
             };
-        /// 16: sets a register to `(register & and_mask) | (or_mask & !and_mask)`.
-        fn mask_write_register(address: u16, and_mask: u16, or_mask: u16)
+        /// 16: starts a request that sets a register to
+        /// `(register & and_mask) | (or_mask & !and_mask)`.
+        fn start_mask_write_register(address: u16, and_mask: u16, or_mask: u16)
             => |node: &mut Node, line| node.mask_write_register(line, address, and_mask, or_mask);
-        /// 17: writes 1 to 121 registers, then reads 1 to 125 into the response words.
-        fn read_write_multiple_registers(
+        /// 17: starts a request that writes 1 to 121 registers, then reads 1 to 125 into the response
+        /// words.
+        fn start_read_write_multiple_registers(
             read_address: u16, read_quantity: u16, write_address: u16, words: &[u16]
         ) => |node: &mut Node, line| {
             let write = (write_address, put_words(line, words));
             node.read_write_multiple_registers(line, (read_address, read_quantity), write)
         };
     }
-}
-
-/// A number of items. More than 65535 are refused as 65535 are.
-fn quantity(items: usize) -> u16 {
-    items.try_into().unwrap_or(u16::MAX)
 }
 
 /// Copies words into the transmit words, and returns their number. A request refuses a number that

@@ -20,6 +20,24 @@ pub const EXTENDED: u8 = 3;
 /// Read device id code: one object.
 pub const INDIVIDUAL: u8 = 4;
 
+/// What a request to Read Device Identification reads: its read device id code.
+///
+/// ```
+/// assert_eq!(mbm::pdu::identification::DeviceIdCode::Individual as u8, 4);
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum DeviceIdCode {
+    /// The basic objects: vendor, product and revision.
+    Basic = BASIC,
+    /// The basic and the regular objects.
+    Regular = REGULAR,
+    /// All objects.
+    Extended = EXTENDED,
+    /// One object.
+    Individual = INDIVIDUAL,
+}
+
 /// The fields of a response to Read Device Identification after its code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdentificationReply<'a> {

@@ -55,6 +55,15 @@ pub trait Port {
     /// The time in microseconds, which wraps at 2^32.
     fn micros(&mut self) -> u32;
 
+    /// Called by a call that waits, for example
+    /// [`Master::read_holding_registers`](crate::master::Master::read_holding_registers), whenever it
+    /// has nothing to do for `micros` microseconds, unless a byte arrives. The port may sleep: at most
+    /// for that time, or less if it does not notice arriving bytes. By default it does not sleep.
+    fn idle(&mut self, micros: u32) {
+        let _ = micros;
+        core::hint::spin_loop();
+    }
+
     /// True once the last accepted byte has left the transmitter.
     fn flush(&mut self) -> bool {
         true

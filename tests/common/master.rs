@@ -127,16 +127,16 @@ impl Call {
             bits.take(quantity.into()).collect()
         };
         match self.function {
-            0x01 => master.read_coils(a, b),
-            0x02 => master.read_discrete_inputs(a, b),
-            0x03 => master.read_holding_registers(a, b),
-            0x04 => master.read_input_registers(a, b),
-            0x05 => master.write_single_coil(a, b != 0),
-            0x06 => master.write_single_register(a, b),
-            0x0F => master.write_multiple_coils(a, &bits(b)),
-            0x10 => master.write_multiple_registers(a, &words(b)),
-            0x16 => master.mask_write_register(a, b, c),
-            0x17 => master.read_write_multiple_registers(a, b, c, &words(d)),
+            0x01 => master.start_read_coils(a, b),
+            0x02 => master.start_read_discrete_inputs(a, b),
+            0x03 => master.start_read_holding_registers(a, b),
+            0x04 => master.start_read_input_registers(a, b),
+            0x05 => master.start_write_single_coil(a, b != 0),
+            0x06 => master.start_write_single_register(a, b),
+            0x0F => master.start_write_multiple_coils(a, &bits(b)),
+            0x10 => master.start_write_multiple_registers(a, &words(b)),
+            0x16 => master.start_mask_write_register(a, b, c),
+            0x17 => master.start_read_write_multiple_registers(a, b, c, &words(d)),
             other => panic!("the master has no function {other:#x}"),
         }
     }

@@ -346,7 +346,7 @@ fn a_master_sends_and_receives_through_a_trace() {
     } = Bench::new(Framing::Rtu, Request);
     let buffers = Buffers::new([0; 256], [0; 8], [0; 8]);
     let mut master = Master::new(17, trace, buffers);
-    assert_eq!(master.read_holding_registers(107, 3), Ok(()));
+    assert_eq!(master.start_read_holding_registers(107, 3), Ok(()));
     wire.borrow_mut().flushed = true;
     let reply = frame(Framing::Rtu, REPLY);
     while master.poll().is_pending() {

@@ -1,4 +1,4 @@
-//! Firmware that reads registers of unit 17 through a UART: with the master that is polled, and
+//! Firmware that reads registers of unit 17 through a UART: with the master whose calls wait, and
 //! with the master whose functions are futures. It prints them on the debugger's console.
 #![no_std]
 #![no_main]
@@ -20,17 +20,12 @@ const UNIT: u8 = 17;
 const BAUD: u32 = 115_200;
 
 /// Reads the registers 20 and 21.
-fn read_polled() -> Result<[u16; 2], Error> {
+fn read_blocking() -> Result<[u16; 2], Error> {
     // The frame buffer, the words that a read fills, the words that a write sends.
     let buffers = Buffers::new([0; 32], [0; 10], []);
     let mut master = Master::new(UNIT, EmbeddedIo::serial(Uart, micros), buffers);
     master.settings().set_baud_rate(BAUD);
-    master.read_holding_registers(20, 2)?;
-    master.wait(|| { /* The firmware does its other work here. */ })?;
-    match *master.response() {
-        [first, second] => Ok([first, second]),
-        _ => Err(Error::MalformedReply),
-    }
+    master.holding_registers(20)
 }
 
 /// Writes 888 to register 22, and reads the registers 22 and 23.
@@ -38,10 +33,8 @@ async fn read_awaited() -> Result<[u16; 2], Error> {
     let buffers = Buffers::new([0; 32], [0; 10], [0; 10]);
     let mut master = AsyncMaster::new(UNIT, Uart, micros, Delay, buffers);
     master.settings().set_baud_rate(BAUD);
-    let mut words = [0; 2];
     master.write_single_register(22, 888).await?;
-    master.read_holding_registers(22, &mut words).await?;
-    Ok(words)
+    master.holding_registers(22).await
 }
 
 /// Polls a future to its end. An executor would sleep in between.
@@ -67,6 +60,6 @@ fn print(name: &str, read: Result<[u16; 2], Error>) -> u32 {
 fn main() -> ! {
     board::start();
     uart::start(BAUD);
-    let failed = print("polled", read_polled()) + print("awaited", block_on(read_awaited()));
+    let failed = print("blocking", read_blocking()) + print("awaited", block_on(read_awaited()));
     board::exit(failed)
 }

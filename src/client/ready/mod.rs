@@ -1,5 +1,8 @@
 //! Ready-made requests, whose data are slices of the program.
 
+mod functions;
+
+use super::call::quantity;
 use super::request::{ClientRequest, RequestState};
 use crate::data::view::take_words;
 use crate::error::{Error, Status};
@@ -72,11 +75,6 @@ impl Slice<'_> {
     }
 }
 
-/// A number of items. No request has more than 65535, so these are refused too.
-fn quantity(items: usize) -> u16 {
-    items.try_into().unwrap_or(u16::MAX)
-}
-
 /// A request with its data in slices. The client returns it when it has ended, and it can be
 /// queued again.
 ///
@@ -91,36 +89,6 @@ pub struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// A request of any function, for those that have no constructor here. `build` calls the function
-    /// of [`RequestState`] that makes the request. `sends` has its data in the order of the wire, as
-    /// many bytes as the request needs; `takes` is the place for the data of the response.
-    ///
-    /// ```
-    /// use mbm::client::Request;
-    ///
-    /// // 08, sub-function 0: the device returns the two bytes.
-    /// let (mut data, mut echo) = ([0xA5, 0x37], [0; 2]);
-    /// let request =
-    ///     Request::of_bytes(17, |state| state.diagnostics(0, 1), &mut data, &mut echo)?;
-    /// # Ok::<(), mbm::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// What `build` returns; [`Error::InvalidArgument`] if `sends` has another length.
-    pub fn of_bytes(
-        unit: u8,
-        build: impl FnOnce(&mut RequestState) -> Status,
-        sends: &'a mut [u8],
-        takes: &'a mut [u8],
-    ) -> Result<Self, Error> {
-        let length = sends.len();
-        let request = Request::build(unit, Slice::Bytes(sends), Slice::Bytes(takes), build)?;
-        match usize::from(request.state.data_length()) == length {
-            true => Ok(request),
-            false => Err(Error::InvalidArgument),
-        }
-    }
-
     fn build(
         unit: u8,
         sends: Slice<'a>,
@@ -133,6 +101,9 @@ impl<'a> Request<'a> {
         match build(&mut state) {
             Status::OK => {}
             refused => return Err(Error::refused(refused)),
+        }
+        if u16::from(state.known_data()) > state.capacity {
+            return Err(Error::BufferTooSmall);
         }
         Ok(Request {
             state,
@@ -309,7 +280,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// The bytes that a request of [`Request::of_bytes`] has received.
+    /// The bytes that a request has received whose data are bytes; none for one that has failed.
     pub fn bytes(&self) -> &[u8] {
         match &self.takes {
             Slice::Bytes(bytes) => bytes.get(..usize::from(self.state.length)),
