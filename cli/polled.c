@@ -28,8 +28,11 @@ uint16_t polled_read_count(polled *p)
 {
     uint16_t i, right = 0;
 
-    for (i = 0; i < p->meter.readable; i++)
-        right = (uint16_t)(right + (mbm_plan_getStatus(&p->plan, i, NULL) == MBM_OK));
+    for (i = 0; i < p->meter.readable; i++) {
+        const uint8_t code = device_plan_status(&p->plan, &p->meter, i, NULL);
+
+        right = (uint16_t)(right + (code == MBM_OK || code == MBM_NOT_AVAILABLE));
+    }
     return right;
 }
 

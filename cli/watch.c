@@ -119,11 +119,42 @@ static int more(int a, int b)
     return a > b ? a : b;
 }
 
-/* The columns that fit, in the order in which they are left out; the name and the value shrink. */
+/* Takes columns from the name, and then from the value, until the table fits or they have their
+ * least. Returns the width of the table. */
+static int shrink(int widths[COLUMNS], int total, int most, int name, int value)
+{
+    int i;
+
+    for (i = NAME; i <= VALUE && total > most; i++) {
+        const int least = i == NAME ? name : value, over = total - most;
+        const int cut = widths[i] - over < least ? more(widths[i] - least, 0) : over;
+
+        widths[i] -= cut;
+        total -= cut;
+    }
+    return total;
+}
+
+/* Gives the name and the value what is left, up to what they need. */
+static void give_back(int widths[COLUMNS], const int needed[COLUMNS], int left)
+{
+    int i;
+
+    for (i = VALUE; i >= NAME && left > 0; i--) {
+        const int given = needed[i] - widths[i] < left ? needed[i] - widths[i] : left;
+
+        widths[i] += given;
+        left -= given;
+    }
+}
+
+/* The columns that fit, in the order in which they are left out. Before that the name and the value
+ * shrink, as long as a date fits; and if that is not enough, further. */
 static void choose_widths(watch *w, drawing *d)
 {
     static const enum column DROPPED[] = {UNIT, CHANGED, LEAST, MOST, AGE, STATUS};
-    int *widths = d->widths, total = 0, i;
+    enum { NAME_KEEPS = 16, VALUE_KEEPS = 25, LEAST_WIDTH = 8 };
+    int *widths = d->widths, needed[COLUMNS], total = 0, i;
 
     widths[MARK] = 1;
     widths[NAME] = more(screen_width(HEADS[NAME]), polled_name_width(w->of->of));
@@ -133,24 +164,23 @@ static void choose_widths(watch *w, drawing *d)
     widths[CHANGED] = 7;
     widths[LEAST] = widths[MOST] = more(w->number_width, 6);
     widths[STATUS] = 16;
+    memcpy(needed, widths, sizeof needed);
     for (i = 0; i < COLUMNS; i++)
         total += widths[i] ? widths[i] + (i == MARK ? 1 : 2) : 0;
+    total = shrink(widths, total, d->columns, NAME_KEEPS, VALUE_KEEPS);
     for (i = 0; i < (int)(sizeof DROPPED / sizeof DROPPED[0]) && total > d->columns; i++) {
         const enum column one = DROPPED[i];
 
         total -= widths[one] ? widths[one] + 2 : 0;
         widths[one] = 0;
+        /* One of the two alone would look like the other. */
+        if (one == LEAST) {
+            total -= widths[MOST] + 2;
+            widths[MOST] = 0;
+        }
     }
-    /* One of the two alone would look like the other. */
-    if (widths[LEAST] == 0)
-        widths[MOST] = 0;
-    for (i = NAME; i <= VALUE && total > d->columns; i++) {
-        const int least = 8, over = total - d->columns;
-        const int cut = widths[i] - over < least ? more(widths[i] - least, 0) : over;
-
-        widths[i] -= cut;
-        total -= cut;
-    }
+    total = shrink(widths, total, d->columns, LEAST_WIDTH, LEAST_WIDTH);
+    give_back(widths, needed, d->columns - total);
 }
 
 static void put_column(drawing *d, enum column column, const char *text)

@@ -307,6 +307,23 @@ def test_no_line_is_wider_than_the_terminal(watching, columns):
     assert ("MIN" in heads) == ("MAX" in heads) and heads[:2] == ["NAME", "VALUE"], heads
 
 
+def test_a_narrow_terminal_keeps_dates_and_statuses(watching, device, write):
+    """80 columns hold a long name in part, a date as a whole, and why a field has no value."""
+    path = write("long.yaml", """\
+fields:
+- {name: a clock that has a very long name, table: holding, address: 0, type: unix32}
+- {name: missing, table: holding, address: 4, type: uint16, not_available: 0}
+- {name: broken, table: holding, address: 5, type: iec870_3}
+""")
+    terminal = watching(path=path, columns=80)
+    terminal.shows(r"^  NAME +VALUE +AGE +STATUS$")
+    # The name has what the date leaves.
+    terminal.shows(r"^  a clock that has a very .*…  1970-01-01T00:00:00Z +\d\.\ds +success$")
+    terminal.shows(r"^  missing +- +\d\.\ds +not available$")
+    terminal.shows(r"^! broken +- +\d\.\ds +the registers hold?.*…$")
+    terminal.shows("  2 of 3 fields read  ")
+
+
 def test_any_sizes_and_keys_leave_the_table_alive(watching, long):
     chance = random.Random(7)
     terminal = watching(path=long)
