@@ -233,8 +233,8 @@ typedef struct mbm_planConversion {
 typedef struct mbm_planSplitting {
     /** Storage: as many as fields. */
     uint16_t *blocks;
-    /** After this time a field that the device does not have is tried again, and a read that was
-     *  divided in vain is tried as a whole, in milliseconds; 0 means 600000, ten minutes. */
+    /** After this time a field that the device does not have is tried again, and neighbours that
+     *  could not be joined are tried as one, in milliseconds; 0 means 600000, ten minutes. */
     uint32_t retryMs;
     uint32_t triedAt; /**< Private. */
     /** How many reads there is storage for in `reads` of the setup; 0 means `readCount` of the

@@ -68,8 +68,8 @@ pub(super) const HELD: u8 = 8;
 pub(super) const QUEUED: u8 = 16;
 /// It was cut out of another read, and has not been answered since.
 pub(super) const FRESH: u8 = 32;
-/// The reads of its block were joined as far as they can be.
-pub(super) const JOINED: u8 = 64;
+/// It is not joined with the read before it: that was tried.
+pub(super) const APART: u8 = 64;
 /// It was joined of others, and has not been answered since.
 pub(super) const TRIAL: u8 = 128;
 
@@ -104,8 +104,8 @@ pub struct Read {
     /// How often the wait after a request without an answer is doubled.
     pub(super) doublings: Cell<u8>,
     pub(super) flags: Cell<u8>,
-    /// Its size is the same on an AVR, where nothing is aligned.
-    _padding: u8,
+    /// The lowest byte of the place at which a union was joined.
+    pub(super) seam: u8,
 }
 
 impl Read {

@@ -2,14 +2,14 @@
 //!
 //! A device answers exception 02 or 03 to a read if it lacks one address of it, or if the read is
 //! too long for it. The read is then cut in two, and each half is tried at once, and so on until
-//! what is refused is one field. That one is tried again rarely. Neighbours that the device has are
-//! joined again, once: a union that fails is cut, until the device has a field again or
-//! [`Splitter::forgive`] lets unions be tried anew.
+//! what is refused is one field. That one is tried again rarely. Two neighbours that the device has
+//! are joined again, once: a union that fails is cut where it was joined, until the device has a field
+//! again or [`Splitter::forgive`] lets unions be tried anew.
 //!
 //! The reads that were one at first are a *block*. Their fields stay side by side.
 
 use super::field::Field;
-use super::read::{Position, Read, FRESH, HELD, JOINED, QUEUED, SUSPENDED, TRIAL};
+use super::read::{Position, Read, APART, FRESH, HELD, QUEUED, SUSPENDED, TRIAL};
 use crate::error::Status;
 
 /// What a plan's reads are divided with: its parts and storage.
@@ -90,7 +90,12 @@ impl Splitter<'_> {
         let refusal = is_refusal(status);
         if refusal || flags & TRIAL != 0 && is_failure(status) {
             let (first, end) = self.places(read);
-            if let Some(cut) = self.find_cut(first, end) {
+            let cut = if flags & TRIAL != 0 {
+                self.seam(read, first, end)
+            } else {
+                self.find_cut(first, end)
+            };
+            if let Some(cut) = cut {
                 if self.divide(read, (first, cut, end), before, now) {
                     return Finding::Divided;
                 }
@@ -103,12 +108,12 @@ impl Splitter<'_> {
         }
         if status == Status::OK && is_refusal(before) {
             // The device has it again: what was cut may be one again.
-            self.clear_block(read, JOINED);
+            self.clear_block(read, APART);
             return Finding::Settled;
         }
         if status == Status::OK || status.is_exception() {
             self.clear(read, FRESH | TRIAL);
-            if flags & FRESH != 0 {
+            if flags & (FRESH | TRIAL) != 0 {
                 return Finding::Settled;
             }
         }
@@ -118,36 +123,34 @@ impl Splitter<'_> {
     /// Lets unions be tried again that have failed. Call it rarely, and `join` after it.
     pub fn forgive(&mut self) {
         for read in 0..self.count {
-            self.clear(read, JOINED);
+            self.clear(read, APART);
         }
     }
 
-    /// Joins neighbours that the device has, in blocks of which every read has ended. `moved` gets
-    /// the old and the new index of each read that moves. Returns false if it must be called
+    /// Joins pairs of neighbours that the device has, in blocks of which every read has ended. `moved`
+    /// gets the old and the new index of each read that moves. Returns false if it must be called
     /// again after the next read has ended.
     pub fn join(&mut self, now: u32, mut moved: impl FnMut(usize, usize)) -> bool {
         let (mut place, mut is_done) = (0, true);
         while let Some(read) = self.read_at(place) {
             let block = self.block(read);
-            let (mut end, mut flags, mut all) = (place, 0, JOINED);
+            let (mut end, mut flags) = (place, 0);
             while let Some(own) = self.read_at(end).filter(|own| self.block(*own) == block) {
-                let own_flags = self.reads.get(own).map_or(0, |read| read.flags.get());
-                flags |= own_flags;
-                all &= own_flags;
+                flags |= self.reads.get(own).map_or(0, |read| read.flags.get());
                 end = self.places(own).1;
             }
-            if flags & FRESH == 0 && all & JOINED == 0 {
+            if flags & (FRESH | TRIAL) == 0 {
                 is_done &= self.join_block(place, end, now, &mut moved);
             } else {
-                is_done &= flags & FRESH == 0;
+                is_done = false;
             }
             place = end;
         }
         is_done
     }
 
-    /// Joins the reads of a block, which has the places from `place` up to `end`. Returns false if
-    /// one of them is in flight.
+    /// Joins the reads of a block in pairs. It has the places from `place` up to `end`. Returns false
+    /// if one of them is in flight.
     fn join_block(
         &mut self,
         mut place: usize,
@@ -155,31 +158,33 @@ impl Splitter<'_> {
         now: u32,
         moved: &mut impl FnMut(usize, usize),
     ) -> bool {
-        let (start, mut is_done) = (place, true);
+        let mut is_done = true;
         while let Some(left) = self.read_at(place) {
-            let next = self.places(left).1;
-            let Some(right) = self.read_at(next).filter(|_| next < end) else {
+            let seam = self.places(left).1;
+            let Some(right) = self.read_at(seam).filter(|_| seam < end) else {
                 break;
             };
+            place = seam;
+            if self.is_apart(right) {
+                continue;
+            }
             if self.are_queued(left, right) {
                 is_done = false;
-                place = next;
             } else if self.unite(left, right, now) {
-                self.remove(right, moved);
-            } else {
-                place = next;
-            }
-        }
-        if is_done {
-            let mut place = start;
-            while let Some(read) = self.read_at(place).filter(|_| place < end) {
-                if let Some(read) = self.reads.get(read) {
-                    read.set(JOINED);
+                if let Some(read) = self.reads.get_mut(left) {
+                    read.seam = seam as u8;
                 }
-                place = self.places(read).1;
+                place = self.places(left).1;
+                self.remove(right, moved);
             }
         }
         is_done
+    }
+
+    /// True if a read was joined with the one before it in vain.
+    fn is_apart(&self, read: usize) -> bool {
+        let read = self.reads.get(read);
+        read.is_some_and(|read| read.flags.get() & APART != 0)
     }
 
     // --- what is where ---
@@ -260,6 +265,12 @@ impl Splitter<'_> {
             before = field;
         }
         best.map(|(_, place)| place)
+    }
+
+    /// The place at which a union was joined of two reads.
+    fn seam(&self, read: usize, first: usize, end: usize) -> Option<usize> {
+        let seam = self.reads.get(read).map_or(0, |read| read.seam);
+        (first + 1..end).find(|place| *place as u8 == seam)
     }
 
     // --- data ---
@@ -358,19 +369,13 @@ impl Splitter<'_> {
         half.read_at.set(old.read_at.get());
         half.doublings.set(old.doublings.get());
         half.not_before.set(old.not_before.get());
-        let mut flags = old.flags.get();
-        if flags & (FRESH | TRIAL) == 0 {
-            // It is no union that failed, and no part of one.
-            flags &= !JOINED;
-        }
-        flags = flags & !(QUEUED | TRIAL) | FRESH;
+        let flags = old.flags.get();
+        let apart = if flags & TRIAL != 0 { APART } else { 0 };
+        let flags = flags & !(QUEUED | TRIAL) | FRESH;
         old.flags.set(flags);
         // A unit that does not answer is tried with one read.
-        half.flags.set(if flags & SUSPENDED != 0 {
-            flags | HELD
-        } else {
-            flags
-        });
+        let held = if flags & SUSPENDED != 0 { HELD } else { 0 };
+        half.flags.set(flags & !APART | held | apart);
         for half in [old, half] {
             half.due.set(now);
             half.status.set(before.code());

@@ -18,8 +18,8 @@ use mbm::plan::Read;
 pub struct mbm_planSplitting {
     /// Storage: as many as fields.
     pub blocks: *mut u16,
-    /// After this time a field that the device does not have is tried again, and a read that was
-    /// divided in vain is tried as a whole, in milliseconds; 0 means 600000, ten minutes.
+    /// After this time a field that the device does not have is tried again, and neighbours that
+    /// could not be joined are tried as one, in milliseconds; 0 means 600000, ten minutes.
     pub retryMs: u32,
     /// Private.
     pub triedAt: u32,
