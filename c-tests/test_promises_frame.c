@@ -325,14 +325,14 @@ TEST(a_frame_is_parsed_whatever_its_crc_is)
        mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_RESPONSE, bytes, 8, &packet));
     IS(MBM_ILLEGAL_DATA_VALUE,
        mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, 9, &packet));
-    for (uint16_t length = 0; length < 4; length++)
+    for (uint16_t have = 0; have < 4; have++)
         IS(MBM_INCOMPLETE_FRAME,
-           mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, length, &packet));
+           mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, have, &packet));
     IS(MBM_MALFORMED_FRAME,
        mbm_frame_parseWithoutCrc(&rtu, MBM_PACKET_REQUEST, bytes, sizeof bytes, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(NULL, 0, bytes, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(&rtu, 2, bytes, 8, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_parseWithoutCrc(&rtu, 0, NULL, 8, &packet));
+    INVALID(packet, mbm_frame_parseWithoutCrc(NULL, 0, bytes, 8, &packet));
+    INVALID(packet, mbm_frame_parseWithoutCrc(&rtu, 2, bytes, 8, &packet));
+    INVALID(packet, mbm_frame_parseWithoutCrc(&rtu, 0, NULL, 8, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_parseWithoutCrc(&rtu, 0, bytes, 8, NULL));
     /* The LRC of ASCII is checked: it should be 7E. */
     IS(MBM_INVALID_CRC, mbm_frame_parseWithoutCrc(&ascii, MBM_PACKET_REQUEST, text,
@@ -344,7 +344,6 @@ TEST(an_exception_is_taken_out_of_its_frame)
     uint8_t of_rtu[] = {0x0A, 0x81, 2, 0xB0, 0x53};
     uint8_t of_tcp[] = {0xDA, 0x87, 0, 0, 0, 3, 1, 0x81, 3};
     uint8_t response[] = {17, 3, 2, 0, 7, 0, 0};
-    const mbm_framing none = {.kind = MBM_FRAMING_NONE};
     mbm_packet packet, parsed;
 
     OK(mbm_frame_asException(&rtu, of_rtu, sizeof of_rtu, &packet));
@@ -363,10 +362,10 @@ TEST(an_exception_is_taken_out_of_its_frame)
     REFUSED(MBM_MALFORMED_REPLY, packet, mbm_frame_asException(&tcp, of_tcp, 9, &packet));
     seal(response, 5);
     REFUSED(MBM_INVALID_FUNCTION, packet, mbm_frame_asException(&rtu, response, 7, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(NULL, of_tcp, 9, &packet));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(&tcp, NULL, 9, &packet));
+    INVALID(packet, mbm_frame_asException(NULL, of_tcp, 9, &packet));
+    INVALID(packet, mbm_frame_asException(&tcp, NULL, 9, &packet));
     IS(MBM_INVALID_ARGUMENT, mbm_frame_asException(&tcp, of_tcp, 9, NULL));
-    REFUSED(MBM_INVALID_ARGUMENT, packet, mbm_frame_asException(&none, of_tcp, 9, &packet));
+    INVALID(packet, mbm_frame_asException(&alone, of_tcp, 9, &packet));
 }
 
 TEST(bytes_look_like_tcp_from_the_eighth_on)
