@@ -122,7 +122,7 @@
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
 //! use mbm::frame::Framing;
 //! use mbm::server::storage::{HoldingRegisters, RegisterArray};
-//! use mbm::server::{Server, Unit};
+//! use mbm::server::{Server, ServiceUnit};
 //!
 //! # fn main() -> Result<(), mbm::Error> {
 //! let mut words = [555, 100, 0];
@@ -132,7 +132,7 @@
 //! let mut server = Server::with_framing(Framing::Rtu, uart, [0; 256]);
 //! server.set_baud_rate(9600);
 //! let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
-//! let mut units = [Unit {
+//! let mut units = [ServiceUnit {
 //!     id: 17,
 //!     services: &mut [&mut registers],
 //!     diagnostics: None,

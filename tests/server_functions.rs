@@ -8,7 +8,7 @@ use mbm::frame::Framing;
 use mbm::server::custom::HandlerResult;
 use mbm::server::respond;
 use mbm::server::storage::{HoldingRegisters, RegisterArray};
-use mbm::server::Unit;
+use mbm::server::ServiceUnit;
 
 /// The word that a sub-function of 08 returns.
 fn diagnostic_word(device: &mut Device, sub_function: u8) -> u16 {
@@ -249,12 +249,12 @@ fn only_the_addressed_unit_answers_and_a_broadcast_reaches_all_units() {
         let frame = sealed(frame);
         buffer[..frame.len()].copy_from_slice(&frame);
         let units = &mut [
-            Unit {
+            ServiceUnit {
                 id: 1,
                 services: &mut [&mut HoldingRegisters(RegisterArray::new(0, &mut first))],
                 diagnostics: None,
             },
-            Unit {
+            ServiceUnit {
                 id: 2,
                 services: &mut [&mut HoldingRegisters(RegisterArray::new(0, &mut second))],
                 diagnostics: None,

@@ -89,11 +89,87 @@ static LENGTH_RULES: [i8; ENCAPSULATED_INTERFACE_TRANSPORT as usize + 1] = {
     rules
 };
 
+impl<P: Port> Server<P, [u8; 256]> {
+    /// A server on a serial line with RTU frames, with a buffer for any. Set the baud rate. See the
+    /// example at [`Server::run`].
+    pub const fn rtu(port: P) -> Self {
+        let mut server = Server::new(port, [0; 256]);
+        server.begin_rtu_in(256);
+        server
+    }
+
+    /// A server of RTU frames in a TCP stream, with a buffer for any.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/requests.rs"));
+    /// # fn main() {
+    /// # let port = requests(&[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55]);
+    /// # let mut unit = mbm::server::Unit::new(17, mbm::server::Tables::NONE);
+    /// let mut server = mbm::server::Server::rtu_over_tcp(port);
+    /// let lost = server.run(&mut unit);
+    /// # assert_eq!(lost, mbm::Error::LinkLost);
+    /// # }
+    /// ```
+    pub const fn rtu_over_tcp(port: P) -> Self {
+        let mut server = Server::new(port, [0; 256]);
+        server.begin_rtu_over_tcp_in(256);
+        server
+    }
+}
+
+impl<P: Port> Server<P, [u8; 513]> {
+    /// A server on a serial line with ASCII frames, with a buffer for any.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/requests.rs"));
+    /// # fn main() {
+    /// # let port = requests(b":1106006D03780C\r\n");
+    /// # let tables = mbm::server::Tables::NONE.with_holding_registers(109, [0]);
+    /// # let mut unit = mbm::server::Unit::new(17, tables);
+    /// let mut server = mbm::server::Server::ascii(port);
+    /// let lost = server.run(&mut unit);
+    /// # assert_eq!(lost, mbm::Error::LinkLost);
+    /// # }
+    /// ```
+    pub const fn ascii(port: P) -> Self {
+        let mut server = Server::new(port, [0; 513]);
+        server.begin_ascii_in(513);
+        server
+    }
+}
+
+impl<P: Port> Server<P, [u8; 260]> {
+    /// A server of one connection on Modbus TCP, with a buffer for any frame.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/requests.rs"));
+    /// # fn main() {
+    /// # let port = requests(&[0, 1, 0, 0, 0, 6, 17, 6, 0x00, 0x6D, 0x03, 0x78]);
+    /// # let tables = mbm::server::Tables::NONE.with_holding_registers(109, [0]);
+    /// # let mut unit = mbm::server::Unit::new(17, tables);
+    /// let mut server = mbm::server::Server::tcp(port);
+    /// let lost = server.run(&mut unit);
+    /// # assert_eq!(lost, mbm::Error::LinkLost);
+    /// # assert_eq!(unit.device.holding_registers.cells, [888]);
+    /// # }
+    /// ```
+    pub const fn tcp(port: P) -> Self {
+        let mut server = Server::new(port, [0; 260]);
+        server.begin_tcp_in(260);
+        server
+    }
+}
+
 impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Begins with RTU frames on a serial line, and the silence for an unknown baud rate.
     pub fn begin_rtu(&mut self) {
+        self.begin_rtu_in(self.storage.capacity());
+    }
+
+    #[inline(always)]
+    const fn begin_rtu_in(&mut self, capacity: usize) {
         // If the buffer is too short for any frame, this wraps. `Server::pdu` is then empty.
-        let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
+        let space = capacity.wrapping_sub(rtu::OVERHEAD);
         self.begin(
             (rtu::PDU, SERIAL),
             space,
@@ -105,7 +181,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Begins with RTU frames in a TCP stream. Silence does not separate frames there.
     pub fn begin_rtu_over_tcp(&mut self) {
-        let space = rtu_space(self.storage.capacity());
+        self.begin_rtu_over_tcp_in(self.storage.capacity());
+    }
+
+    #[inline(always)]
+    const fn begin_rtu_over_tcp_in(&mut self, capacity: usize) {
+        let space = rtu_space(capacity);
         self.begin(
             (rtu::PDU, STREAM),
             space,
@@ -118,7 +199,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Begins with ASCII frames on a serial line.
     pub fn begin_ascii(&mut self) {
-        let space = ascii_space(self.storage.capacity());
+        self.begin_ascii_in(self.storage.capacity());
+    }
+
+    #[inline(always)]
+    const fn begin_ascii_in(&mut self, capacity: usize) {
+        let space = ascii_space(capacity);
         self.begin(
             (rtu::PDU, SERIAL),
             space,
@@ -132,7 +218,12 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Begins with Modbus TCP frames.
     pub fn begin_tcp(&mut self) {
-        let space = tcp_space(self.storage.capacity());
+        self.begin_tcp_in(self.storage.capacity());
+    }
+
+    #[inline(always)]
+    const fn begin_tcp_in(&mut self, capacity: usize) {
+        let space = tcp_space(capacity);
         self.begin(
             (tcp::PDU, STREAM),
             space,

@@ -186,7 +186,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Sets the framing and waits for a request. A request that has arrived in part is dropped.
     #[inline(always)]
-    pub(super) fn begin(
+    pub(super) const fn begin(
         &mut self,
         (head, own): (usize, u8),
         space: usize,
@@ -214,7 +214,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Sets the silence that ends a frame, in microseconds: t3.5 for RTU, the
     /// inter-character timeout for ASCII.
-    pub fn set_silence(&mut self, microseconds: u32) {
+    pub const fn set_silence(&mut self, microseconds: u32) {
         self.silence = time::clamped(microseconds);
     }
 
@@ -241,7 +241,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Waits for the next request.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub(super) fn listen(&mut self) {
+    pub(super) const fn listen(&mut self) {
         self.phase = ServerPhase::Listen;
         self.end = 0;
         self.request.overrun = false;
@@ -457,6 +457,36 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             status => status.result()?,
         }
         self.go_on().result()
+    }
+
+    /// Serves requests until the link is lost. Between two polls the port may sleep, in
+    /// [`Port::idle`]. A program that has other work calls [`Server::serve`] itself.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/requests.rs"));
+    /// # fn main() {
+    /// use mbm::server::{Server, Tables, Unit};
+    ///
+    /// # let port = requests(&[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55]);
+    /// let mut server = Server::rtu(port);
+    /// server.set_baud_rate(9600);
+    /// let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
+    /// assert_eq!(server.run(&mut unit), mbm::Error::LinkLost);
+    /// // A master wrote 888 to register 109.
+    /// assert_eq!(unit.device.holding_registers.cells, [555, 100, 888, 0]);
+    /// # }
+    /// ```
+    pub fn run(&mut self, units: &mut (impl Units + ?Sized)) -> Error {
+        loop {
+            let now = self.port.micros();
+            if let Err(error) = self.serve(now, units) {
+                return error;
+            }
+            let delay = self.poll_delay(now);
+            if delay > 0 {
+                self.port.idle(delay);
+            }
+        }
     }
 
     /// Takes the reply to the request. The PDU of a response has overwritten that of the request.

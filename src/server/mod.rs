@@ -5,12 +5,15 @@
 //! the services of that unit get the PDU one after the other, until one of them serves the
 //! function and writes the response over the request.
 //!
-//! A service is one family of functions. Firmware carries only the services that it names.
+//! A program has a [`Device`]: a struct that reads and writes its values, or [`Tables`] of arrays. A
+//! [`Unit`] gives it an id. Below that, a [`Service`] is one family of functions, and a
+//! [`ServiceUnit`] a list of them: firmware carries only the services that it names.
 //!
 //! Checks come in the order of the standard (V1.1b3, clause 7): function, quantity, address,
 //! execution. A write is carried out completely or not at all.
 
 pub mod custom;
+mod device;
 pub mod diagnostics;
 pub mod files;
 mod framing;
@@ -18,12 +21,18 @@ pub mod identity;
 mod indication;
 mod line;
 mod reply;
+mod serve_device;
 pub mod storage;
 pub mod table;
+mod tables;
+mod unit;
 mod units;
 
+pub use device::{Bits, BitsMut, Device};
 pub use framing::{respond, DELIMITER};
 pub use indication::{only_writes, Addressing, Indication, ANY};
 pub use line::{Server, ServerStorage};
 pub use reply::{Refusal, Reply};
-pub use units::{dispatch, Dispatch, Service, Unit, Units};
+pub use tables::{Table, Tables};
+pub use unit::Unit;
+pub use units::{dispatch, Dispatch, Service, ServiceUnit, Units};

@@ -32,8 +32,9 @@ pub trait Units {
     }
 }
 
-/// One unit: its id and its services.
-pub struct Unit<'a> {
+/// One unit of a list of services. [`Unit`](super::Unit) is one of a
+/// [`Device`](super::Device), which most programs have.
+pub struct ServiceUnit<'a> {
     /// The unit id, 1 to 247; 0 in a stream responds to every id.
     pub id: u8,
     /// The services, in this order: the first one that handles a function serves it. If it lacks
@@ -43,10 +44,10 @@ pub struct Unit<'a> {
     pub diagnostics: Option<&'a mut Diagnostics>,
 }
 
-impl fmt::Debug for Unit<'_> {
+impl fmt::Debug for ServiceUnit<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         formatter
-            .debug_struct("Unit")
+            .debug_struct("ServiceUnit")
             .field("id", &self.id)
             .finish_non_exhaustive()
     }
@@ -98,41 +99,61 @@ impl Service for Diagnostics {
     }
 }
 
-impl Unit<'_> {
-    /// Lets the services serve a request one after the other, until one of them answers it.
-    fn serve_pdu(&mut self, pdu: &mut [u8], length: usize) -> Reply {
-        let services = self.services.iter_mut().map(|service| &mut **service);
-        let line = self.diagnostics.as_deref_mut();
-        let mut refusal = Refusal::NONE;
-        for service in services.chain(line.map(|line| line as &mut dyn Service)) {
-            if refusal.is_of_cells() && service.is_custom() {
-                continue;
-            }
-            let reply = service.serve(pdu, length);
-            if !refusal.note(reply) {
-                return reply;
-            }
+/// Lets the services serve a request one after the other, until one of them answers it.
+fn serve_pdu(
+    services: &mut [&mut dyn Service],
+    line: Option<&mut Diagnostics>,
+    pdu: &mut [u8],
+    length: usize,
+) -> Reply {
+    let services = services.iter_mut().map(|service| &mut **service);
+    let mut refusal = Refusal::NONE;
+    for service in services.chain(line.map(|line| line as &mut dyn Service)) {
+        if refusal.is_of_cells() && service.is_custom() {
+            continue;
         }
-        refusal.reply()
+        let reply = service.serve(pdu, length);
+        if !refusal.note(reply) {
+            return reply;
+        }
     }
+    refusal.reply()
+}
 
+impl ServiceUnit<'_> {
     /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.
     fn serve(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply {
-        let length = usize::from(info.length);
-        let function = pdu.first().copied().unwrap_or(0);
-        let mut served = addressing != Addressing::FOREIGN;
-        if let Some(line) = &mut self.diagnostics {
-            served = line.count_frame(info, addressing, pdu.get(..length).unwrap_or_default());
-        }
-        if !served {
-            return Reply::NO_RESPONSE;
-        }
-        let reply = self.serve_pdu(pdu, length);
-        if let (Some(line), true) = (&mut self.diagnostics, reply != Reply::PENDING) {
-            line.count_outcome(addressing, function, reply);
-        }
-        reply
+        let services = &mut *self.services;
+        let line = self.diagnostics.as_deref_mut();
+        offer_counted(line, info, addressing, pdu, |line, pdu, length| {
+            serve_pdu(services, line, pdu, length)
+        })
     }
+}
+
+/// Lets `serve` serve a frame that is addressed to a unit. Counts any frame in the diagnostics of
+/// `line`.
+pub(super) fn offer_counted(
+    mut line: Option<&mut Diagnostics>,
+    info: &Indication,
+    addressing: Addressing,
+    pdu: &mut [u8],
+    serve: impl FnOnce(Option<&mut Diagnostics>, &mut [u8], usize) -> Reply,
+) -> Reply {
+    let length = usize::from(info.length);
+    let function = pdu.first().copied().unwrap_or(0);
+    let mut served = addressing != Addressing::FOREIGN;
+    if let Some(line) = &mut line {
+        served = line.count_frame(info, addressing, pdu.get(..length).unwrap_or_default());
+    }
+    if !served {
+        return Reply::NO_RESPONSE;
+    }
+    let reply = serve(line.as_deref_mut(), pdu, length);
+    if let (Some(line), true) = (&mut line, reply != Reply::PENDING) {
+        line.count_outcome(addressing, function, reply);
+    }
+    reply
 }
 
 /// Units in a slice, and the frame that they are offered.
@@ -142,8 +163,8 @@ struct Slice<'a, U> {
     pdu: &'a mut [u8],
 }
 
-impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U> {
-    type Unit = &'u mut Unit<'a>;
+impl<'u, 'a: 'u, U: Iterator<Item = &'u mut ServiceUnit<'a>>> Dispatch for Slice<'_, U> {
+    type Unit = &'u mut ServiceUnit<'a>;
 
     fn next(&mut self) -> Option<Self::Unit> {
         self.units.next()
@@ -158,7 +179,7 @@ impl<'u, 'a: 'u, U: Iterator<Item = &'u mut Unit<'a>>> Dispatch for Slice<'_, U>
     }
 }
 
-impl Units for [Unit<'_>] {
+impl Units for [ServiceUnit<'_>] {
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
         let all = info.addressing(pdu.first().copied().unwrap_or(0));
         let units = self.iter_mut();

@@ -12,7 +12,7 @@ use mbm::server::respond;
 use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };
-use mbm::server::{Reply, Service, Unit};
+use mbm::server::{Reply, Service, ServiceUnit};
 
 /// Unit 17: ten registers and 20 bits of each kind from address 100 on, files 3 and 4 with
 /// ten records each, and FIFO queues of 2, 31 and 32 registers.
@@ -134,7 +134,7 @@ impl Device {
     }
 
     /// Runs `action` on the device's unit.
-    pub fn with_unit<R>(&mut self, action: impl FnOnce(Unit) -> R) -> R {
+    pub fn with_unit<R>(&mut self, action: impl FnOnce(ServiceUnit) -> R) -> R {
         let (refuse, asked, written) = (self.refuse, &mut self.asked, &mut self.written);
         let mut before = |address: u16, quantity: u16, data: &[u8]| {
             asked.push((address, quantity, data.to_vec()));
@@ -153,7 +153,7 @@ impl Device {
         let mut discrete = DiscreteInputs(BitArray::new(100, &mut self.discrete));
         discrete.0.size = 20;
         let custom = self.custom;
-        action(Unit {
+        action(ServiceUnit {
             id: self.id,
             services: &mut [
                 &mut DisabledFunctions(self.off),

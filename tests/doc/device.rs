@@ -26,7 +26,7 @@ impl mbm::port::Port for Device {
         let mut registers = HoldingRegisters(RegisterArray::new(107, &mut self.registers));
         let mut coils = Coils(BitArray::new(0, &mut self.coils));
         let services: &mut [&mut dyn mbm::server::Service] = &mut [&mut registers, &mut coils];
-        let mut units = [mbm::server::Unit { id: 17, services, diagnostics: None }];
+        let mut units = [mbm::server::ServiceUnit { id: 17, services, diagnostics: None }];
         let mut frame = [0; 513];
         frame[..bytes.len()].copy_from_slice(bytes);
         let sent = mbm::server::respond(self.framing, END, &mut frame, bytes.len(), &mut units[..])?;

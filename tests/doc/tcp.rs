@@ -3,7 +3,7 @@
 
 use mbm::frame::Framing;
 use mbm::server::storage::{HoldingRegisters, RegisterArray};
-use mbm::server::{Server, Unit};
+use mbm::server::{Server, ServiceUnit};
 use std::net::TcpListener;
 
 /// Serves one connection until it is lost. Returns the address.
@@ -18,7 +18,7 @@ fn serve() -> String {
         let mut words = [555, 100, 0];
         let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
         let services: &mut [&mut dyn mbm::server::Service] = &mut [&mut registers];
-        let mut units = [Unit { id: 17, services, diagnostics: None }];
+        let mut units = [ServiceUnit { id: 17, services, diagnostics: None }];
         while server.serve(0, &mut units[..]).is_ok() {
             std::thread::sleep(Duration::from_millis(1));
         }

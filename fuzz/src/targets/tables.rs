@@ -6,7 +6,7 @@ use crate::{naive, Input};
 use mbm::server::storage::{
     BitArray, Coils, DiscreteInputs, HoldingRegisters, InputRegisters, RegisterArray,
 };
-use mbm::server::{Indication, Service, Unit, Units};
+use mbm::server::{Indication, Service, ServiceUnit, Units};
 use mbm_c::*;
 use std::any::Any;
 use std::ffi::c_void;
@@ -290,7 +290,7 @@ impl Memory {
             space: 253,
             ..Indication::NONE
         };
-        let unit = Unit {
+        let unit = ServiceUnit {
             id: UNIT,
             services: &mut services,
             diagnostics: None,
