@@ -72,7 +72,8 @@ typedef struct mbm_linkCounters {
  *   client reads the port in each poll and drops what it reads: late replies, noise, frames
  *   of others. If something else reads the line, call mbm_client_suspend first.
  * - It opens the link again: for a request at once, if the link was good until it was lost; else
- *   after a wait that grows with each attempt that fails.
+ *   after a wait that grows with each attempt that fails. A link that was opened for a request,
+ *   and is lost before anything was sent over it, has failed too.
  * - A link that the peer closes twice in a row while no request is there stays closed until the
  *   next request.
  * - It looks whether the link is still open before it sends a request. So a peer that closes idle

@@ -88,6 +88,9 @@ pub struct Link {
     /// The link was good until it was lost, or the device silent: a request opens it without a
     /// wait, and waits for that attempt, as long as its response timeout.
     reopens: bool,
+    /// The link was opened for a request, and nothing was sent over it since. If it is lost
+    /// now, the request does not open it once more, since that could go on for ever.
+    pub is_vain: bool,
     /// The peer has closed the link while no request was there, and has done so twice in a row
     /// without any byte between: only a request opens it.
     was_idle: bool,
@@ -242,7 +245,7 @@ impl Link {
                     false => Status::LINK_LOST,
                 };
                 // A silent device sets the pace of its replacements by its requests.
-                self.reopens = !self.at_once && (was_good || self.is_silent);
+                self.reopens = !self.at_once && !self.is_vain && (was_good || self.is_silent);
                 let was_idle = was_good && !is_wanted && !self.is_silent;
                 self.rests = was_idle && self.was_idle && !self.has_received;
                 self.was_idle = was_idle;
@@ -259,6 +262,7 @@ impl Link {
                     return None;
                 }
                 self.rests = false;
+                self.is_vain = is_needed;
                 if is_needed {
                     self.attempts = 0;
                 }

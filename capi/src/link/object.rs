@@ -75,18 +75,18 @@ pub(super) struct Pace {
 c_object! { mbm_link, *mut Object }
 
 /// The hooks of a link, as the core calls them.
-struct Hooks {
-    hooks: mbm_linkHooks,
-    link: *mut Object,
-}
+struct Hooks(*mut Object);
 
 // SAFETY, of all functions here: the hooks are C functions that keep the contract of their
-// comments, and `link` is begun.
+// comments, and the link is begun.
 impl LinkHooks for Hooks {
     fn disconnect(&mut self) {
-        if let Some(disconnect) = self.hooks.disconnect {
-            // SAFETY: see above.
-            unsafe { disconnect(self.hooks.context) }
+        // SAFETY: see above.
+        unsafe {
+            let hooks = &raw const (*self.0).hooks;
+            if let Some(disconnect) = (*hooks).disconnect {
+                disconnect((*hooks).context);
+            }
         }
     }
 
@@ -94,29 +94,33 @@ impl LinkHooks for Hooks {
         // SAFETY: see above. Closing uses no hook of the link, and not its core.
         unsafe {
             // In the first step nothing was closed yet.
-            close(self.link);
-            count(self.link, |counters| &mut counters.attempts);
-            match self.hooks.connect {
-                Some(connect) => Status::from_code(connect(self.hooks.context)),
+            close(self.0);
+            count(self.0, |counters| &mut counters.attempts);
+            let hooks = &raw const (*self.0).hooks;
+            match (*hooks).connect {
+                Some(connect) => Status::from_code(connect((*hooks).context)),
                 None => Status::LINK_LOST,
             }
         }
     }
 
     fn status(&mut self) -> Status {
-        match self.hooks.status {
-            // SAFETY: see above.
-            Some(status) => Status::from_code(unsafe { status(self.hooks.context) }),
-            // Only in the first step is the link neither open nor being opened.
-            None => Status::LINK_LOST,
+        // SAFETY: see above.
+        unsafe {
+            let hooks = &raw const (*self.0).hooks;
+            match (*hooks).status {
+                Some(status) => Status::from_code(status((*hooks).context)),
+                // Only in the first step is the link neither open nor being opened.
+                None => Status::LINK_LOST,
+            }
         }
     }
 
     fn random(&mut self) -> u32 {
         // SAFETY: see above.
         unsafe {
-            match (*self.link).random {
-                Some(random) => random((*self.link).random_context),
+            match (*self.0).random {
+                Some(random) => random((*self.0).random_context),
                 None => 0,
             }
         }
@@ -135,7 +139,7 @@ unsafe fn close(link: *mut Object) {
 }
 
 /// Counts one event, if there are counters.
-unsafe fn count(link: *mut Object, counter: fn(&mut mbm_linkCounters) -> &mut u32) {
+unsafe fn count(link: *mut Object, counter: impl FnOnce(&mut mbm_linkCounters) -> &mut u32) {
     // The counters are valid as mbm_link_setCounters demands.
     if let Some(counters) = (*link).counters.as_mut() {
         let counter = counter(counters);
@@ -180,12 +184,8 @@ unsafe fn advance_linked(
             return ended;
         }
     }
-    let mut hooks = Hooks {
-        hooks: (*link).hooks,
-        link,
-    };
     let is_wanted = client::queue(object).has_waiting();
-    let happened = (*link).core.step(now, fresh, is_wanted, &mut hooks);
+    let happened = (*link).core.step(now, fresh, is_wanted, &mut Hooks(link));
     if (*link).core.state() == LinkState::Down {
         close(link);
     }
@@ -224,11 +224,7 @@ unsafe fn advance_transport(
 ) -> Option<RequestPtr> {
     // The request of the link is in no queue.
     // The link's own step, which calls no hook while the link is up.
-    let mut hooks = Hooks {
-        hooks: (*link).hooks,
-        link,
-    };
-    (*link).core.step(now, false, false, &mut hooks);
+    (*link).core.step(now, false, false, &mut Hooks(link));
     if !fresh || !client::queue(object).is_empty() {
         let mut fresh = fresh;
         if client::queue(object).may_send(now) {
@@ -311,14 +307,11 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
 /// Counts an event. Returns the request whose `done` reports the event, if the program wants
 /// to know it.
 unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
-    count(
-        link,
-        match event {
-            LinkEvent::Connected => |counters| &mut counters.connected,
-            LinkEvent::Lost => |counters| &mut counters.lost,
-            LinkEvent::Failed => |counters| &mut counters.failed,
-        },
-    );
+    count(link, |counters| match event {
+        LinkEvent::Connected => &mut counters.connected,
+        LinkEvent::Lost => &mut counters.lost,
+        LinkEvent::Failed => &mut counters.failed,
+    });
     (*link).callback?;
     (*link).event = event as u8;
     (*link).status = status.code();

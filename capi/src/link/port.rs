@@ -48,6 +48,7 @@ unsafe extern "C" fn read(context: *mut c_void, bytes: *mut u8, capacity: u16) -
 unsafe extern "C" fn write(context: *mut c_void, bytes: *const u8, length: u16) -> i16 {
     // SAFETY: see above.
     unsafe {
+        (*context.cast::<Object>()).core.is_vain = false;
         moved(context, |own| {
             own.write.unwrap_unchecked()(own.context, bytes, length)
         })

@@ -198,10 +198,11 @@ impl<P: Port, S: ClientStorage> Tcp<P, S> {
             if let Some(request) = self.conclude(queue, at, status, now, &mut reads_left, rules) {
                 return Some(request);
             }
-            if rules.is_single() {
+            let again = queue.queue.get(at).map(ClientRequest::state);
+            // The request is still in flight as long as bytes arrive that may be its response.
+            if rules.is_single() && !again.is_some_and(RequestState::is_sent) {
                 break;
             }
-            let again = queue.queue.get(at).map(ClientRequest::state);
             if queue.unanswered != unanswered && again.is_some_and(|state| state.wait == 0) {
                 // It is repeated in the next poll, since a link may be replaced first.
                 break;
