@@ -65,7 +65,6 @@ TEST(a_field_has_what_its_file_says)
     assert_int_equal(device_size(planned), 3);
     assert_int_equal(device_find(&meter, "model"), 1);
     assert_int_equal(device_find(&meter, "mode"), -1);
-    device_free(&meter);
 }
 
 TEST(what_a_file_leaves_out_has_the_documented_value)
@@ -78,10 +77,8 @@ TEST(what_a_file_leaves_out_has_the_documented_value)
     assert_int_equal(meter.planned->count, 1);
     assert_int_equal(meter.fields->access, DEVICE_READ);
     assert_int_equal(meter.fields->form.scale.digits, 0);
-    device_free(&meter);
     read_text("fields: [{name: a, table: coils, address: 65535}]\n");
     assert_int_equal(meter.planned->type, MBM_TYPE_BIT);
-    device_free(&meter);
 }
 
 TEST(fields_that_can_only_be_written_come_last)
@@ -99,7 +96,6 @@ TEST(fields_that_can_only_be_written_come_last)
         assert_string_equal(meter.fields[i].name, names[i]);
         assert_int_equal(meter.planned[i].address, names[i][0] - 'a');
     }
-    device_free(&meter);
 }
 
 static void expect_words(const char *text, unsigned count, const uint16_t *words)
@@ -109,7 +105,6 @@ static void expect_words(const char *text, unsigned count, const uint16_t *words
     assert_int_equal(device_size(meter.planned), count);
     for (unsigned i = 0; i < count; i++)
         assert_int_equal(meter.fields->words[i], words[i]);
-    device_free(&meter);
 }
 
 #define WORDS(text, ...)                                                                           \
@@ -127,10 +122,8 @@ TEST(bits_of_a_register_are_written_if_the_device_writes_masks)
     assert_int_equal(device_part(&meter.planned[0], 5), 0x5000);
     assert_int_equal(device_mask(&meter.planned[1], 0), 0x0008);
     assert_int_equal(device_part(&meter.planned[1], 1), 0x0008);
-    device_free(&meter);
     read_text("mask_write: no\n" UINT16(""));
     assert_int_equal(meter.writes_masks, 0);
-    device_free(&meter);
 }
 
 TEST(a_value_becomes_registers_exactly)
@@ -319,7 +312,6 @@ TEST(keys_that_do_not_go_together_are_refused)
                            "  - {name: c, table: input, address: 7, type: uint16, value: 1}\n"
                            "  - {name: d, table: holding, address: 7, type: uint16, unit: 2, value: 2}\n"
                            "  - {name: e, table: holding, address: 4, type: uint64}\n");
-    device_free(&meter);
 }
 
 TEST(a_value_that_the_registers_cannot_hold_is_refused)
@@ -372,18 +364,14 @@ TEST(an_enumeration_names_the_numbers_of_its_field)
     assert_string_equal(device_label_of(&meter, 0, off), "off");
     assert_string_equal(device_label_of(&meter, 0, on), "on");
     assert_null(device_label_of(&meter, 0, other));
-    device_free(&meter);
     read_text(UINT16("    order: BADC\n    enumeration: {4: running}\n"));
     assert_string_equal(device_label_of(&meter, 0, swapped), "running");
     assert_null(device_label_of(&meter, 0, none));
-    device_free(&meter);
     read_text(
         FIELD("    type: bit\n    bit: 4\n    count: 3\n    enumeration: {5: keypad, 7: bus}\n"));
     assert_string_equal(device_label_of(&meter, 0, bits), "keypad");
-    device_free(&meter);
     read_text(UINT16(""));
     assert_null(device_label_of(&meter, 0, off));
-    device_free(&meter);
 }
 
 TEST(a_wrong_enumeration_is_refused_with_its_line)
@@ -534,12 +522,10 @@ TEST(any_damaged_file_is_read_or_refused)
             default: length = round % 50 == 0 ? at + 1 : length; break;
             }
         }
-        if (read_bytes(bytes, length) == CODE_DONE) {
+        if (read_bytes(bytes, length) == CODE_DONE)
             right++;
-            device_free(&meter);
-        } else {
+        else
             assert_int_equal(memcmp(wrong, path, strlen(path)), 0);
-        }
     }
     assert_in_range(right, 100, 19900);
 }

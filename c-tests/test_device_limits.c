@@ -20,7 +20,6 @@ TEST(a_device_without_limits_has_those_of_the_standard)
     assert_int_equal(meter.fields->write_function, DEVICE_BY_SIZE);
     assert_int_equal(device_most_written(&meter, MBM_TABLE_HOLDING_REGISTERS), 123);
     assert_int_equal(device_most_written(&meter, MBM_TABLE_COILS), 1968);
-    device_free(&meter);
 }
 
 TEST(a_device_has_the_limits_of_its_file)
@@ -35,15 +34,12 @@ TEST(a_device_has_the_limits_of_its_file)
     assert_int_equal(meter.fields->write_function, DEVICE_MULTIPLE);
     assert_int_equal(device_most_written(&meter, MBM_TABLE_HOLDING_REGISTERS), 16);
     assert_int_equal(device_most_written(&meter, MBM_TABLE_COILS), 8);
-    device_free(&meter);
     read_text(FIELD("gap: {registers: 3, bits: 100}\n", "table: coils, address: 7"));
     assert_int_equal(meter.limits.register_gap, 3);
     assert_int_equal(meter.limits.bit_gap, 100);
-    device_free(&meter);
     read_text(FIELD("gap: 2000\n", "table: coils, address: 7"));
     assert_int_equal(meter.limits.register_gap, 125);
     assert_int_equal(meter.limits.bit_gap, 2000);
-    device_free(&meter);
 }
 
 TEST(a_field_is_written_by_its_own_function_or_that_of_the_head)
@@ -55,7 +51,6 @@ TEST(a_field_is_written_by_its_own_function_or_that_of_the_head)
                "- {name: c, table: holding, address: 2, type: uint32}\n"));
     assert_int_equal(meter.fields[device_find(&meter, "a")].write_function, DEVICE_SINGLE);
     assert_int_equal(meter.fields[device_find(&meter, "b")].write_function, DEVICE_MULTIPLE);
-    device_free(&meter);
 }
 
 static void expect_range(const char *head, uint8_t table, uint16_t first, uint16_t last,
@@ -70,7 +65,6 @@ static void expect_range(const char *head, uint8_t table, uint16_t first, uint16
     assert_int_equal(meter.limits.excluded->first, first);
     assert_int_equal(meter.limits.excluded->last, last);
     assert_int_equal(meter.limits.excluded->unit, unit);
-    device_free(&meter);
 }
 
 TEST(excluded_addresses_have_a_long_and_a_short_form)
@@ -88,7 +82,6 @@ TEST(a_field_that_can_only_be_written_may_lie_in_excluded_addresses)
     read_text(FIELDS("excluded: [holding: 5]\n",
                      "- {name: a, table: holding, address: 5, type: uint16, access: write}\n"
                      "- {name: b, table: input, address: 5, type: uint16}\n"));
-    device_free(&meter);
 }
 
 TEST(a_wrong_limit_is_refused_with_its_line)
@@ -165,7 +158,6 @@ static void expect_place(const char *head, const char *keys, uint8_t table, uint
     read_text(text);
     assert_int_equal(meter.planned->table, table);
     assert_int_equal(meter.planned->address, address);
-    device_free(&meter);
 }
 
 TEST(an_address_of_modicon_says_its_table)
@@ -311,7 +303,6 @@ TEST(a_field_is_repeated_with_a_number_in_its_name)
     assert_string_equal(meter.fields[2].description, "Channel 3");
     assert_int_equal(meter.fields[2].line, 2);
     assert_int_equal(meter.fields[2].words[0], 0x3FC0);
-    device_free(&meter);
 }
 
 TEST(a_group_of_fields_is_repeated_together)
@@ -328,14 +319,12 @@ TEST(a_group_of_fields_is_repeated_together)
     expect_field(2, "current 1", 101);
     expect_field(3, "channel 2 voltage", 110);
     expect_field(4, "current 2", 111);
-    device_free(&meter);
 }
 
 TEST(a_name_outside_a_repetition_keeps_its_braces)
 {
     read_text(FIELDS("", "- name: a {n}\n  table: coils\n  address: 1\n"));
     assert_string_equal(meter.fields->name, "a {n}");
-    device_free(&meter);
 }
 
 TEST(a_device_may_have_as_many_repeated_fields_as_a_plan)
@@ -343,7 +332,6 @@ TEST(a_device_may_have_as_many_repeated_fields_as_a_plan)
     read_text(FIELD("", "table: coils, address: 1, repeat: {count: 4000, every: 1}"));
     assert_int_equal(meter.count, 4000);
     expect_field(3999, "a 4000", 4000);
-    device_free(&meter);
 }
 
 #define LONG_NAME                                                                                  \

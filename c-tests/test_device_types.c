@@ -15,7 +15,6 @@
         assert_int_equal(device_size(&meter.planned[0]), COUNT(wanted));                           \
         assert_non_null(meter.fields[0].words);                                                    \
         assert_memory_equal(meter.fields[0].words, wanted, sizeof wanted);                         \
-        device_free(&meter);                                                                       \
     } while (0)
 
 TEST(a_value_of_each_type_is_these_registers)
@@ -70,7 +69,6 @@ TEST(a_plan_reads_other_types_as_registers)
     field = device_read_as(&meter.planned[3]);
     assert_int_equal(field.type, MBM_TYPE_UINT32);
     assert_int_equal(field.order, MBM_ORDER_CDAB);
-    device_free(&meter);
 }
 
 TEST(an_order_by_halves_is_that_of_its_half_for_two_registers)
@@ -82,7 +80,6 @@ TEST(an_order_by_halves_is_that_of_its_half_for_two_registers)
     assert_int_equal(meter.planned[0].order, MBM_ORDER_DCBA);
     assert_int_equal(meter.planned[1].order, MBM_ORDER_DCBAHGFE);
     assert_int_equal(meter.planned[2].order, MBM_ORDER_DCBA);
-    device_free(&meter);
 }
 
 /* --- bits --- */
@@ -98,7 +95,6 @@ static void expect_part(const char *keys, uint16_t address, uint8_t bit, uint16_
     assert_int_equal(meter.planned[0].address, address);
     assert_int_equal(meter.planned[0].bit, bit);
     assert_int_equal(meter.planned[0].count, count);
-    device_free(&meter);
 }
 
 TEST(bits_of_a_wide_field_in_one_register_are_bits_of_that_register)
@@ -131,7 +127,6 @@ TEST(bits_of_several_registers_are_one_number_beside_others)
     assert_int_equal(meter.fields[0].words[1], 0x5000);
     assert_string_equal(device_label_of(&meter, 0, meter.fields[0].words), "on");
     assert_int_equal(device_mask(&meter.planned[3], 3), 0xFFFF);
-    device_free(&meter);
 }
 
 /* --- refusals --- */

@@ -33,14 +33,12 @@ static void expect_shown(const char *lines, const char *text, uint16_t first, ui
 {
     read_text(lines);
     expect_text(text, MBM_OK, first, second);
-    device_free(&meter);
 }
 
 static void expect_none(const char *lines, uint16_t first, uint16_t second)
 {
     read_text(lines);
     expect_text("", MBM_NOT_AVAILABLE, first, second);
-    device_free(&meter);
 }
 
 TEST(an_offset_is_added_exactly_after_the_scale)
@@ -72,7 +70,6 @@ TEST(a_precision_rounds_halves_away_from_zero)
     /* It changes nothing of what is written. */
     read_text(INT16("    scale: 0.01\n    precision: 0\n    value: 1.25\n"));
     assert_int_equal(meter.fields->words[0], 125);
-    device_free(&meter);
 }
 
 TEST(numbers_that_mean_not_available_are_no_value)
@@ -133,12 +130,10 @@ TEST(not_available_at_the_head_is_for_the_fields_that_it_fits)
     assert_null(meter.fields[3].conversion);
     assert_int_equal(meter.fields[4].conversion->number_count, 0);
     assert_int_equal(meter.fields[5].conversion->number_count, 1);
-    device_free(&meter);
     read_text("not_available: standard\nfields:\n"
               "- {name: a, table: holding, address: 0, type: int16}\n"
               "- {name: b, table: holding, address: 0, type: bit, bit: 4, count: 2}\n");
     assert_int_equal(meter.fields[0].conversion->is_standard, 1);
-    device_free(&meter);
 }
 
 /* --- a power of ten --- */
@@ -155,13 +150,11 @@ TEST(a_scale_may_be_the_name_of_the_field_with_the_power_of_ten)
     assert_int_equal(meter.fields[2].power_field, 1);
     assert_int_equal(meter.fields[0].words[0], 123);
     expect_text("12.3", MBM_OK, 123, 0);
-    device_free(&meter);
     /* Without a value the power is 0. */
     read_text("fields:\n"
               "- {name: level, table: holding, address: 7, type: uint16, scale: sf, value: 12}\n"
               "- {name: sf, table: holding, address: 8, type: int16}\n");
     assert_int_equal(meter.fields[0].words[0], 12);
-    device_free(&meter);
 }
 
 TEST(a_repeated_field_has_the_power_of_its_own_repetition)
@@ -176,7 +169,6 @@ TEST(a_repeated_field_has_the_power_of_its_own_repetition)
     assert_string_equal(meter.fields[meter.fields[0].power_field].name, "sf 1");
     assert_string_equal(meter.fields[meter.fields[3].power_field].name, "sf 2");
     assert_string_equal(meter.fields[meter.fields[4].power_field].name, "common");
-    device_free(&meter);
 }
 
 TEST(a_field_that_cannot_have_a_power_of_ten_is_refused)
@@ -290,14 +282,12 @@ TEST(a_number_outside_its_limits_is_not_written)
     expect_limit("30.00000000000000000001", "is greater than max_value, which is 30");
     expect_limit("1e99", "is greater than max_value, which is 30");
     expect_limit("5.6", "is not min_value, 5, and a multiple of step, which is 0.5");
-    device_free(&meter);
     read_text(INT16("    step: 25\n"));
     expect_limit("-50", NULL);
     expect_limit("0", NULL);
     expect_limit("1e6", NULL);
     expect_limit("26", "is not a multiple of step, which is 25");
     expect_limit("0.25", "is not a multiple of step, which is 25");
-    device_free(&meter);
 }
 
 /* --- decimal numbers --- */

@@ -30,12 +30,20 @@ static void remove_file(void)
     remove(path);
 }
 
-fixture all_tests = {make_file, remove_file};
+static void free_meter(void)
+{
+    device_free(&meter);
+}
 
+fixture all_tests = {make_file, remove_file};
+fixture each_test = {NULL, free_meter};
+
+/* Reads a file into `meter`. */
 static inline int read_bytes(const char *text, size_t length)
 {
     FILE *file = fopen(path, "wb");
 
+    free_meter();
     assert_non_null(file);
     assert_int_equal(fwrite(text, 1, length, file), length);
     assert_int_equal(fclose(file), 0);
