@@ -165,7 +165,10 @@ class Verdict(unittest.TestCase):
         self.assertEqual(sorted(set(self.tree.ran)), ["abi", "errors", "ring", "test_bits", "test_ring"])
 
     def test_a_loop_without_end_is_stopped_and_kills(self):
-        self.assertEqual(self.verdict({"test_ring": (1, "stopped")}), "killed by test_ring, which was stopped")
+        self.assertEqual(self.verdict({"test_ring": (9, "stopped")}), "killed by test_ring, which was stopped")
+
+    def test_a_test_that_is_stopped_once_kills_nothing(self):
+        self.assertEqual(self.verdict({"test_ring": (1, "stopped")}), "SURVIVED")
 
     def test_the_test_that_killed_runs_first_then_those_of_the_same_words(self):
         self.assertEqual(self.verdict({}, MUTANT._replace(verdict="killed by test_bits::gone")), "SURVIVED")
