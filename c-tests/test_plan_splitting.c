@@ -231,3 +231,88 @@ TEST(a_silent_unit_is_left_alone_while_it_is_searched)
     plan_device_run(&d, 20 * SECOND);
     expect_found();
 }
+
+/* --- a power of ten --- */
+
+/* A number, a register, and the number's power of ten. */
+static const mbm_planConversion power = {.powerField = 2, .flags = MBM_CONVERSION_POWER};
+
+static void add_scaled(void)
+{
+    add_registers(3);
+    d.fields[0].type = d.fields[2].type = MBM_TYPE_INT16;
+    d.registers[0] = 2305;
+    d.registers[2] = (uint16_t)-1;
+}
+
+static void expect_scaled(double expected)
+{
+    double value = 0;
+
+    assert_int_equal(mbm_plan_getConverted(&d.plan, 0, 0, &power, &value), MBM_OK);
+    assert_true(value == expected);
+}
+
+static void expect_nothing(void)
+{
+    double value;
+
+    assert_int_equal(mbm_plan_getConverted(&d.plan, 0, 0, &power, &value), MBM_NOT_AVAILABLE);
+}
+
+TEST(a_power_of_ten_that_comes_to_lie_in_another_read_is_found_there)
+{
+    add_scaled();
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    assert_int_equal(reads(), 1);
+    expect_scaled(230.5);
+    d.lacks[1] = 1;
+    plan_device_run(&d, 2 * SECOND);
+    assert_int_equal(reads(), 3);
+    expect_scaled(230.5);
+    /* Each changes with the next reply to its own read. */
+    d.registers[0] = 23;
+    d.registers[2] = 1;
+    plan_device_run(&d, 2 * SECOND);
+    expect_scaled(230);
+    /* The device has the register between them again: they are one read. */
+    d.lacks[1] = 0;
+    plan_device_run(&d, RETRY + 5 * SECOND);
+    assert_int_equal(reads(), 1);
+    expect_scaled(230);
+}
+
+TEST(a_value_is_not_available_if_its_power_of_ten_in_another_read_is_not_there)
+{
+    add_scaled();
+    d.lacks[1] = 1;
+    plan_device_start(&d);
+    plan_device_run(&d, 900);
+    expect_scaled(230.5);
+    d.lacks[2] = 1;
+    plan_device_run(&d, 2 * SECOND);
+    IS(MBM_OK, status(0));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, status(2));
+    expect_nothing();
+    d.lacks[1] = d.lacks[2] = 0;
+    plan_device_run(&d, RETRY + 5 * SECOND);
+    expect_scaled(230.5);
+}
+
+TEST(a_value_has_no_power_of_ten_while_its_read_is_searched_for_the_first_time)
+{
+    uint32_t ms;
+
+    add_scaled();
+    d.lacks[1] = 1;
+    plan_device_start(&d);
+    for (ms = 0; ms < 900; ms++) {
+        double value;
+
+        plan_device_run(&d, 1);
+        if (mbm_plan_getConverted(&d.plan, 0, 0, &power, &value) == MBM_OK)
+            assert_true(value == 230.5);
+    }
+    expect_scaled(230.5);
+}

@@ -7,6 +7,9 @@
 //!
 //! `MBM_LIVES` in the environment is the number of lives of each test, `MBM_SEED` the first one.
 
+#[path = "common/random.rs"]
+mod random;
+
 use mbm::client::{Client, Request, Serial, Settings};
 use mbm::engine::{Buffers, Frame, MicrosSetting};
 use mbm::error::Status;
@@ -16,6 +19,7 @@ use mbm::master::{node::Node, request::Line};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::port::Port;
 use mbm::Error;
+use random::Random;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -36,26 +40,6 @@ const READS: u16 = 80;
 /// if there are more that do not answer.
 const EXACT: usize = 10;
 const MOST_UNHEARD: u32 = 4;
-
-/// A generator of random numbers.
-struct Random(u64);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    fn below(&mut self, limit: u32) -> u32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 33) % u64::from(limit)) as u32
-    }
-
-    fn one_of<T: Copy>(&mut self, items: &[T]) -> T {
-        items[self.below(items.len() as u32) as usize]
-    }
-}
 
 /// The fate of a device's replies, counted from its first request, which is 0.
 #[derive(Clone, Copy, Debug)]
@@ -602,15 +586,10 @@ fn live_queued(seed: u64) -> Result<(), String> {
     Ok(())
 }
 
-fn variable(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
-}
-
 /// Lives as many lives as the environment says, from its first one on.
 fn lives(live: fn(u64) -> Result<(), String>) {
-    let first = variable("MBM_SEED", 0);
     let mut found = [0; 2];
-    for seed in first..first + variable("MBM_LIVES", 4000) {
+    for seed in random::seeds(4000) {
         if let Err(text) = live(seed) {
             println!("{text}");
             found[usize::from(text.starts_with("wrong"))] += 1;

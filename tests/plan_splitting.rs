@@ -1,254 +1,18 @@
 //! Reads that a device refuses are cut until the fields that it lacks are found: random plans with
 //! devices that have holes and limits, lose replies, and gain what they lacked.
 
+#[path = "common/divided.rs"]
+mod divided;
 #[path = "common/plan.rs"]
 mod plan;
 
+use divided::{Device, World, RETRY_MS};
 use mbm::error::Status;
 use mbm::plan::field::{BIT, UINT16, UINT32, UINT64};
 use mbm::plan::field::{COILS, DISCRETE_INPUTS, HOLDING_REGISTERS, INPUT_REGISTERS};
-use mbm::plan::group::group;
-use mbm::plan::schedule::{Backoff, Schedule};
-use mbm::plan::split::{Finding, Splitter};
-use mbm::plan::value::place;
-use mbm::plan::{Field, Limits, Position, Read};
+use mbm::plan::{Field, Limits};
 use plan::LIMITS;
 use proptest::prelude::*;
-use std::collections::BTreeSet;
-
-const RETRY_MS: u32 = 30_000;
-const BACKOFF: Backoff = Backoff {
-    first_ms: 1000,
-    longest_ms: 60_000,
-};
-
-/// What a device lacks, and how much one read may request.
-#[derive(Clone, Debug, Default)]
-struct Device {
-    holes: BTreeSet<(u8, u16)>,
-    most: u16,
-    /// It answers a read that is too long with nothing.
-    is_mute: bool,
-}
-
-impl Device {
-    fn has(&self, table: u8, address: u16, quantity: u16) -> bool {
-        (address..address + quantity).all(|own| !self.holes.contains(&(table, own)))
-    }
-
-    fn answer(&self, read: &Read) -> Status {
-        if read.quantity > self.most {
-            return if self.is_mute {
-                Status::RESPONSE_TIMED_OUT
-            } else {
-                Status::ILLEGAL_DATA_VALUE
-            };
-        }
-        if self.has(read.table, read.address, read.quantity) {
-            Status::OK
-        } else {
-            Status::ILLEGAL_DATA_ADDRESS
-        }
-    }
-}
-
-fn bit_of(table: u8, address: u16) -> bool {
-    (u32::from(address) + u32::from(table)).wrapping_mul(2_654_435_761) >> 16 & 1 != 0
-}
-
-/// A plan at work on a device.
-struct World {
-    fields: Vec<Field>,
-    positions: Vec<Position>,
-    reads: Vec<Read>,
-    data: Vec<u16>,
-    blocks: Vec<u16>,
-    count: usize,
-    schedule: Schedule,
-    now: u32,
-    serial: u16,
-    requests: usize,
-    is_settled: bool,
-    forgiven: u32,
-}
-
-impl World {
-    fn new(fields: Vec<Field>, limits: &Limits, spare: usize) -> World {
-        let count = fields.len();
-        let mut world = World {
-            positions: vec![Position::NONE; count],
-            reads: vec![Read::default(); count],
-            data: Vec::new(),
-            blocks: vec![0; count],
-            fields,
-            count: 0,
-            schedule: Schedule::default(),
-            now: u32::MAX - 5000,
-            serial: 0,
-            requests: 0,
-            is_settled: true,
-            forgiven: u32::MAX - 5000,
-        };
-        world.count = group(
-            &world.fields,
-            0,
-            limits,
-            &mut world.positions,
-            &mut world.reads,
-            u16::MAX,
-        )
-        .expect("the table is right");
-        let words = world.reads[..world.count]
-            .iter()
-            .map(|read| usize::from(read.words()));
-        world.data = vec![0; words.sum::<usize>() + spare];
-        world.splitter().start();
-        world.schedule.start(&world.reads[..world.count], world.now);
-        world
-    }
-
-    fn splitter(&mut self) -> Splitter<'_> {
-        Splitter {
-            fields: &self.fields,
-            positions: &mut self.positions,
-            reads: &mut self.reads,
-            data: &mut self.data,
-            blocks: &mut self.blocks,
-            count: self.count,
-        }
-    }
-
-    /// Sends the next read and takes its answer, or lets time pass.
-    fn step(&mut self, device: &Device, is_lost: bool) {
-        let reads = &self.reads[..self.count];
-        let Some(next) = self.schedule.next(reads, self.now) else {
-            let idle = self.schedule.idle(reads, self.now).clamp(1, 1000);
-            self.now = self.now.wrapping_add(idle);
-            return;
-        };
-        let index = next.index(reads);
-        self.requests += 1;
-        self.schedule.begin(reads);
-        self.now = self.now.wrapping_add(3);
-        let (before, read) = (reads[index].status(), reads[index].clone());
-        let status = if is_lost {
-            Status::RESPONSE_TIMED_OUT
-        } else {
-            device.answer(&read)
-        };
-        if status == Status::OK {
-            self.fill(&read);
-        }
-        let reads = &self.reads[..self.count];
-        self.schedule
-            .end(reads, &reads[index], status, self.now, &BACKOFF);
-        let now = self.now;
-        let mut splitter = self.splitter();
-        let finding = splitter.end(index, before, now, RETRY_MS);
-        let count = splitter.count;
-        self.count = count;
-        if finding != Finding::Nothing {
-            self.is_settled = false;
-        }
-        if now.wrapping_sub(self.forgiven) >= RETRY_MS {
-            self.forgiven = now;
-            self.splitter().forgive();
-            self.is_settled = false;
-        }
-        if !self.is_settled {
-            let mut splitter = self.splitter();
-            let is_settled = splitter.join(now, |from, to| assert!(to < from));
-            self.count = splitter.count;
-            self.is_settled = is_settled;
-        }
-        self.schedule.renew(&self.reads[..self.count], now);
-        self.check();
-    }
-
-    /// Stores a reply: each register has its address and the number of the reply.
-    fn fill(&mut self, read: &Read) {
-        self.serial = self.serial.wrapping_add(1);
-        let offset = usize::from(read.offset);
-        for nth in 0..read.quantity {
-            let address = read.address + nth;
-            let place = usize::from(nth);
-            if read.is_of_bits() {
-                let bit = u16::to_le(1 << (place % 16));
-                let word = &mut self.data[offset + place / 16];
-                *word = *word & !bit | if bit_of(read.table, address) { bit } else { 0 };
-            } else {
-                self.data[offset + place] = self.serial << 8 | address & 0xFF;
-            }
-        }
-    }
-
-    fn read_of(&self, field: usize) -> &Read {
-        &self.reads[self.positions[field].read()]
-    }
-
-    /// Every field lies within its read; what it has is from its addresses and from one reply; and
-    /// no two reads share data.
-    fn check(&self) {
-        for (index, field) in self.fields.iter().enumerate() {
-            assert!(self.positions[index].read() < self.count);
-            let read = self.read_of(index);
-            assert_eq!(
-                (read.unit.into(), read.table, read.interval_ms),
-                (field.unit, field.table, field.interval_ms)
-            );
-            assert!(read.address <= field.address);
-            assert!(u32::from(read.address) + u32::from(read.quantity) >= field.end());
-            if !read.has_data() {
-                continue;
-            }
-            let offset = usize::from(read.offset);
-            let (word, before) = place(field, read.address, 0).expect("it has a value");
-            let mut serial = None;
-            for nth in 0..field.length() as u16 {
-                let address = field.address + nth;
-                if field.is_in_bits() {
-                    let at = usize::from(word) * 16 + usize::from(before) + usize::from(nth);
-                    let found = u16::from_le(self.data[offset + at / 16]) >> (at % 16) & 1 != 0;
-                    assert_eq!(found, bit_of(field.table, address), "{field:?}");
-                } else {
-                    let found = self.data[offset + usize::from(word) + usize::from(nth)];
-                    assert_eq!(found & 0xFF, address & 0xFF, "{field:?} {read:?}");
-                    assert_eq!(*serial.get_or_insert(found >> 8), found >> 8, "{field:?}");
-                }
-            }
-        }
-        let mut areas: Vec<_> = self.reads[..self.count]
-            .iter()
-            .map(|read| (read.offset, read.offset + read.words()))
-            .collect();
-        areas.sort_unstable();
-        assert!(
-            areas.windows(2).all(|two| two[0].1 <= two[1].0),
-            "{areas:?}"
-        );
-        assert!(areas
-            .iter()
-            .all(|area| usize::from(area.1) <= self.data.len()));
-        for read in 0..self.count {
-            let own: Vec<_> = Position::fields_of(&self.positions, read).collect();
-            assert!(!own.is_empty());
-            assert!(own
-                .iter()
-                .all(|field| self.positions[*field].read() == read));
-        }
-    }
-
-    fn run(&mut self, device: &Device, milliseconds: u32) {
-        let start = self.now;
-        while self.now.wrapping_sub(start) < milliseconds {
-            self.step(device, false);
-        }
-    }
-
-    fn status(&self, field: usize) -> Status {
-        self.read_of(field).status()
-    }
-}
 
 fn field() -> impl Strategy<Value = Field> {
     let types = prop_oneof![Just(UINT16), Just(UINT32), Just(UINT64)];
@@ -297,14 +61,9 @@ fn device(is_mute: bool) -> impl Strategy<Value = Device> {
 
 fn is_found(world: &World, device: &Device) {
     for (index, field) in world.fields.iter().enumerate() {
-        let is_there = device.has(field.table, field.address, field.length() as u16);
-        let wanted = if is_there {
-            Status::OK
-        } else {
-            Status::ILLEGAL_DATA_ADDRESS
-        };
+        let wanted = device.status_of(field);
         assert_eq!(world.status(index), wanted, "{field:?}");
-        if is_there {
+        if wanted == Status::OK {
             let age = world.read_of(index).age(world.now);
             assert!(age <= 3 * field.interval_ms, "{field:?} is {age} ms old");
         }
@@ -347,7 +106,7 @@ proptest! {
         limits in limits(),
         device in device(false),
     ) {
-        let mut world = World::new(fields, &limits, SPARE);
+        let mut world = World::new(fields, &limits, usize::MAX, SPARE);
         world.run(&device, 20_000);
         is_found(&world, &device);
         if device.most == 2000 {
@@ -367,10 +126,10 @@ proptest! {
         limits in limits(),
         device in device(false),
     ) {
-        let mut world = World::new(fields, &limits, SPARE);
+        let mut world = World::new(fields, &limits, usize::MAX, SPARE);
         let first = world.count;
         world.run(&device, 20_000);
-        let whole = Device { most: 2000, ..Device::default() };
+        let whole = Device::whole();
         world.run(&whole, RETRY_MS + 20_000);
         is_found(&world, &whole);
         prop_assert_eq!(needless_cuts(&world, &whole), 0);
@@ -389,8 +148,8 @@ proptest! {
         spare in 0..40usize,
         change in 0..200usize,
     ) {
-        let mut world = World::new(fields, &limits, spare);
-        let whole = Device { most: 2000, ..Device::default() };
+        let mut world = World::new(fields, &limits, usize::MAX, spare);
+        let whole = Device::whole();
         for (nth, lost) in lost.iter().enumerate() {
             let now = if nth > change { &whole } else { &device };
             world.step(now, lost % 7 == 0);
@@ -417,7 +176,7 @@ fn registers(addresses: impl IntoIterator<Item = u16>) -> Vec<Field> {
 
 #[test]
 fn one_missing_field_of_a_hundred_leaves_three_reads() {
-    let mut world = World::new(registers(0..100), &LIMITS, 0);
+    let mut world = World::new(registers(0..100), &LIMITS, usize::MAX, 0);
     let device = Device {
         holes: [(HOLDING_REGISTERS, 37)].into(),
         most: 2000,
@@ -439,7 +198,7 @@ fn one_missing_register_between_fields_leaves_two_reads() {
             ..LIMITS
         };
         let fields = registers((0..count).filter(|address| *address != hole));
-        let mut world = World::new(fields, &limits, SPARE);
+        let mut world = World::new(fields, &limits, usize::MAX, SPARE);
         let device = Device {
             holes: [(HOLDING_REGISTERS, hole)].into(),
             most: 2000,
@@ -458,7 +217,7 @@ fn one_missing_register_between_fields_leaves_two_reads() {
 
 #[test]
 fn a_device_that_refuses_long_reads_is_read_in_parts_after_one_union_was_tried() {
-    let mut world = World::new(registers(0..120), &LIMITS, 0);
+    let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
     let device = Device {
         most: 80,
         ..Device::default()
@@ -477,7 +236,7 @@ fn a_device_that_refuses_long_reads_is_read_in_parts_after_one_union_was_tried()
 
 #[test]
 fn a_union_that_the_device_does_not_answer_is_cut_again() {
-    let mut world = World::new(registers(0..120), &LIMITS, 0);
+    let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
     let refuses = Device {
         holes: [(HOLDING_REGISTERS, 5)].into(),
         most: 70,
@@ -493,8 +252,34 @@ fn a_union_that_the_device_does_not_answer_is_cut_again() {
 }
 
 #[test]
+fn a_device_that_is_silent_on_long_reads_is_read_in_short_ones_all_the_time() {
+    let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
+    let refuses = Device {
+        most: 35,
+        ..Device::default()
+    };
+    // All parts are found. Longer ones are tried after that.
+    while world.count < 4 {
+        world.step(&refuses, false);
+    }
+    let device = Device {
+        is_mute: true,
+        ..refuses
+    };
+    let start = world.now;
+    while world.now.wrapping_sub(start) < 100_000 {
+        world.step(&device, false);
+        for field in 0..120 {
+            // The unit is left alone for some seconds after unions without an answer.
+            let age = world.read_of(field).age(world.now);
+            assert!(world.now.wrapping_sub(start) < 20_000 || age < 15_000);
+        }
+    }
+}
+
+#[test]
 fn what_was_read_before_stays_while_a_device_is_searched() {
-    let mut world = World::new(registers(0..20), &LIMITS, 0);
+    let mut world = World::new(registers(0..20), &LIMITS, usize::MAX, 0);
     let whole = Device {
         most: 2000,
         ..Device::default()
@@ -526,7 +311,7 @@ fn the_search_of_one_block_leaves_others_as_they_are() {
         register_gap: 2,
         ..LIMITS
     };
-    let mut world = World::new(fields, &limits, 0);
+    let mut world = World::new(fields, &limits, usize::MAX, 0);
     let device = Device {
         holes: [(COILS, 21), (HOLDING_REGISTERS, 70)].into(),
         most: 2000,

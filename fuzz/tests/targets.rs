@@ -99,4 +99,4 @@ macro_rules! tests {
     };
 }
 
-tests!(rtu ascii tcp request_pdu response_pdu engine libmodbus sniffer c_api lives plan trace replies server tables);
+tests!(rtu ascii tcp request_pdu response_pdu engine libmodbus sniffer c_api lives plan division trace replies server tables);

@@ -2,10 +2,11 @@
 //! how far the clock moves. The program tries every order of these events, breadth first. Its
 //! argument is the time in seconds, 300 without one. It then tries every order of requests, blocks and
 //! echoes with a server (see `server`), plays every schedule of late replies
-//! with a client (see `client`), and sends a master every stream of bytes (see `streams`), again
-//! for that time.
+//! with a client (see `client`), every order of the ends of a plan's reads (see `division`), and sends a
+//! master every stream of bytes (see `streams`), again for that time.
 
 mod client;
+mod division;
 #[path = "../../tests/common/frame.rs"]
 mod frame;
 mod line;
@@ -280,6 +281,11 @@ fn main() {
         } else {
             failed += 1;
         }
+    }
+    if division::try_orders(Duration::from_secs(seconds) / 4) {
+        passed += 1;
+    } else {
+        failed += 1;
     }
     println!("{passed} passed, {failed} failed");
     if failed > 0 {

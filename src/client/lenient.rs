@@ -9,8 +9,9 @@
 //! contains none of this code.
 
 use super::request::ClientRequest;
+use super::serial::Serial;
 use super::storage::ClientStorage;
-use super::transaction::{ClientTransaction, Serial};
+use super::transaction::{ClientEngine, ClientTransaction};
 use crate::engine::{Extension, Finding, Moment};
 use crate::frame::rtu;
 use crate::port::Port;
@@ -24,13 +25,13 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
             true => Some(extend as Extension<P, S, ClientTransaction<P, S, J>>),
             false => None,
         };
-        self.set_lenience(lenient);
+        self.engine.set_lenient(lenient);
     }
 }
 
 /// See [`Extension`].
 fn extend<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut Serial<P, S, J>,
+    engine: &mut ClientEngine<P, S, J>,
     moment: Moment,
 ) -> bool {
     moment == Moment::Missed && accept_deviating(engine)
@@ -38,7 +39,7 @@ fn extend<P: Port, S: ClientStorage, J: ClientRequest>(
 
 /// Makes the deviating reply that ends with the last byte the result, if there is one.
 fn accept_deviating<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut Serial<P, S, J>,
+    engine: &mut ClientEngine<P, S, J>,
 ) -> bool {
     if !engine.awaits_reply() {
         return false;
@@ -67,7 +68,7 @@ fn accept_deviating<P: Port, S: ClientStorage, J: ClientRequest>(
 /// The length of the frame of a deviating reply that ends with the last byte, and how many bytes of
 /// unit and PDU count.
 fn find<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut Serial<P, S, J>,
+    engine: &mut ClientEngine<P, S, J>,
 ) -> Option<(u16, u16)> {
     let (unit, function) = (engine.unit, engine.function);
     let have = engine.end - engine.content;

@@ -117,9 +117,8 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
         if !queue(object).is_idle() {
             return Status::BUSY;
         }
-        transport::<SerialTransport>(object)
-            .request()
-            .set_ascii(character);
+        let engine = &mut transport::<SerialTransport>(object).engine;
+        engine.request().set_ascii(character);
         Status::OK
     })
 }

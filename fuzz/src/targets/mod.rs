@@ -2,6 +2,7 @@
 
 use crate::api;
 
+mod division;
 mod engine;
 mod frames;
 mod libmodbus;
@@ -29,6 +30,7 @@ pub const TARGETS: &[Target] = &[
     ("c_api", api::run, 5_000),
     ("lives", api::life::run, 2_500),
     ("plan", plan::run, 100_000),
+    ("division", division::run, 80),
     ("trace", trace::run, 50_000),
     ("replies", replies::run, 200_000),
     ("server", server::run, 10_000),

@@ -79,6 +79,8 @@ pub struct Life {
     pub jobs: Vec<Job>,
     pub gateway: GatewaySide,
     pub plan: PlanSide,
+    /// Bytes that no device sent have arrived.
+    pub is_forged: Cell<bool>,
     /// The requests that are pending.
     pub live: RefCell<BTreeSet<u16>>,
     pub next_id: Cell<u16>,
@@ -134,6 +136,10 @@ pub struct GatewaySide {
 /// The plan, and when each field had news last: `awake` of its line.
 pub struct PlanSide {
     pub plan: *mut mbm_plan,
+    /// With which it divides its reads; NULL if it does not.
+    pub splitting: Cell<*mut mbm_planSplitting>,
+    /// A bit for each field whose first register the devices lack.
+    pub lacks: Cell<u32>,
     pub line: Cell<usize>,
     pub is_begun: Cell<bool>,
     pub news: [Cell<u64>; FIELDS],
@@ -187,6 +193,7 @@ impl Life {
             jobs,
             gateway,
             plan,
+            is_forged: Cell::new(false),
             live: RefCell::default(),
             next_id: Cell::new(FIRST_ID),
             inside: Cell::new(0),
@@ -335,6 +342,8 @@ impl PlanSide {
     pub fn new(w: &World) -> PlanSide {
         PlanSide {
             plan: w.zeroed(),
+            splitting: Cell::new(std::ptr::null_mut()),
+            lacks: Cell::new(0),
             line: Cell::new(0),
             is_begun: Cell::new(false),
             news: Default::default(),

@@ -123,7 +123,9 @@ impl Wire {
             return;
         }
         let bits = usize::from(d).div_ceil(8);
+        let first = u16::from_be_bytes([a, b]);
         let pdu = match function {
+            3 | 4 if mode != 3 && life.plan.is_lacking(first, d.into()) => vec![function | 0x80, 2],
             _ if mode == 3 => vec![function | 0x80, if random & 8 == 0 { 5 } else { 6 }],
             1 | 2 => [vec![function, bits as u8], vec![0; bits]].concat(),
             3 | 4 => [vec![function, 2 * d], vec![0x5A; 2 * usize::from(d)]].concat(),
