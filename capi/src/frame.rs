@@ -118,7 +118,7 @@ pub extern "C" fn mbm_frame_parse(
     frameLength: u16,
     packet: Out<mbm_packet>,
 ) -> u8 {
-    parse(framing, kind, frame, frameLength, packet, Framing::parse)
+    parse::<true>(framing, kind, frame, frameLength, packet)
 }
 
 /// As mbm_frame_parse, but does not check the CRC of an RTU frame: for bytes that another layer has
@@ -136,28 +136,17 @@ pub extern "C" fn mbm_frame_parseWithoutCrc(
     frameLength: u16,
     packet: Out<mbm_packet>,
 ) -> u8 {
-    parse(
-        framing,
-        kind,
-        frame,
-        frameLength,
-        packet,
-        Framing::parse_without_crc,
-    )
+    parse::<false>(framing, kind, frame, frameLength, packet)
 }
 
-/// Finds the unit and the PDU in a frame.
-type Unframe = for<'a> fn(Framing, &'a mut [u8], u8) -> Result<Adu<'a>, Error>;
-
-/// Parses a frame into a packet, with `unframe`.
+/// Parses a frame into a packet, and `CHECKS_CRC`.
 #[inline(always)]
-fn parse(
+fn parse<const CHECKS_CRC: bool>(
     framing: In<mbm_framing>,
     kind: u8,
     frame: Out<u8>,
     frameLength: u16,
     packet: Out<mbm_packet>,
-    unframe: Unframe,
 ) -> u8 {
     let arguments = side(kind).and_then(|pdu_kind| {
         packet.required()?;
@@ -171,7 +160,8 @@ fn parse(
     };
     let mut found = mbm_packet::of(kind, &[]);
     let adu = match format.framing {
-        Some(framing) => unframe(framing, bytes, format.end),
+        Some(framing) if CHECKS_CRC => framing.parse(bytes, format.end),
+        Some(framing) => framing.parse_without_crc(bytes, format.end),
         None => Ok(Adu {
             transaction: 0,
             unit: 0,
