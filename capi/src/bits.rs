@@ -64,7 +64,7 @@ pub extern "C" fn mbm_bits_unpack(bytes: In<u8>, length: u16, coils: Out<u8>, qu
 }
 
 functions! {
-    ()
+    safe ()
 
     /// Gets the state of one coil or discrete input of a read, by its address in the device.
     ///

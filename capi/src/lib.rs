@@ -34,20 +34,23 @@ extern crate std;
 
 /// A table of exported functions, one of C in each row: its comment, its name, its arguments after
 /// `$objects`, and the function that it calls with `$objects` and the arguments that follow. All
-/// return a status.
+/// return a status. A table of functions that need no unsafe code begins with `safe`.
 ///
 /// cbindgen sees no macros: `rows` in `scripts/build/header` expands the tables for it.
 macro_rules! functions {
-    ($objects:tt $($(#[$comment:meta])* fn $name:ident $given:tt = $call:ident $passed:tt;)*) => {
-        $(functions! { @ $objects $(#[$comment])* $name $given $call $passed })*
-    };
-    (@ ($($object:ident: $kind:ty),*) $(#[$comment:meta])* $name:ident ($($given:ident: $type:ty),*)
-        $call:ident ($($passed:expr),* $(,)?)) => {
+    (@ [$($safety:tt)?] ($($object:ident: $kind:ty),*) $(#[$comment:meta])* $name:ident
+        ($($given:ident: $type:ty),*) $call:ident ($($passed:expr),* $(,)?)) => {
         $(#[$comment])*
         #[no_mangle]
-        pub unsafe extern "C" fn $name($($object: $kind,)* $($given: $type),*) -> u8 {
+        pub $($safety)? extern "C" fn $name($($object: $kind,)* $($given: $type),*) -> u8 {
             $call($($object,)* $($passed),*)
         }
+    };
+    (safe $objects:tt $($(#[$comment:meta])* fn $name:ident $given:tt = $call:ident $passed:tt;)*) => {
+        $(functions! { @ [] $objects $(#[$comment])* $name $given $call $passed })*
+    };
+    ($objects:tt $($(#[$comment:meta])* fn $name:ident $given:tt = $call:ident $passed:tt;)*) => {
+        $(functions! { @ [unsafe] $objects $(#[$comment])* $name $given $call $passed })*
     };
 }
 

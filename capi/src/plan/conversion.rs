@@ -213,7 +213,7 @@ functions! {
 }
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// As mbm_plan_getConverted, for registers that a program has read without a plan. On a
     /// Cortex-M it takes 420 bytes of stack.

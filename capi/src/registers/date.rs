@@ -60,7 +60,7 @@ fn layout_of<'a>(layout: In<c_char>, is_bcd: u8) -> Result<Layout<'a>, Error> {
 }
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// Reads a date, or a time of day, from registers of which `layout` says what they hold. It has
     /// a letter for each register, or two for its high and low byte, and a space between two

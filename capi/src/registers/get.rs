@@ -31,7 +31,7 @@ fn get(registers: In<mbm_registers>, address: u16, order: u8, number: Out<u8>, s
 }
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// Reads one bit of a register.
     ///

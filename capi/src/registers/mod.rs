@@ -206,7 +206,7 @@ fn fill(
 }
 
 functions! {
-    (registers: Out<mbm_registers>)
+    safe (registers: Out<mbm_registers>)
 
     /// Fills in a view of words that were read as registers. The order is MBM_ORDER_ABCD
     /// until you set `registers->order`. Nothing is copied: the view always shows the present

@@ -30,7 +30,7 @@ fn set(registers: In<mbm_registers>, address: u16, order: u8, number: In<u8>, si
 }
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// Writes one bit of a register; the other bits do not change.
     ///
@@ -147,7 +147,7 @@ pub extern "C" fn mbm_registers_setString(
 }
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// Writes raw bytes. With MBM_ORDER_ABCD and MBM_ORDER_CDAB the high byte of each
     /// register is first, as on the wire; with MBM_ORDER_BADC and MBM_ORDER_DCBA the low

@@ -7,7 +7,7 @@ use super::set::with;
 use crate::pointers::{In, Out};
 
 functions! {
-    (registers: In<mbm_registers>)
+    safe (registers: In<mbm_registers>)
 
     /// Reads a number in BCD: four digits in one register, eight in two.
     ///
