@@ -9,14 +9,14 @@ TEST(a_reply_ends_in_the_words_of_its_request)
 {
     ModbusSerialClient client;
     ModbusRequestOf<3> request(17);
-    assert_int_equal(request.status(), MBM_OK);
-    assert_int_equal(client.readHoldingRegisters(request, 107, 3), MBM_NOT_INITIALISED);
-    assert_int_equal(client.poll(), MBM_NOT_INITIALISED);
-    assert_int_equal(client.begin(Serial, 19200), MBM_OK);
-    assert_int_equal(client.poll(), MBM_OK);
+    OK(request.status());
+    IS(MBM_NOT_INITIALISED, client.readHoldingRegisters(request, 107, 3));
+    IS(MBM_NOT_INITIALISED, client.poll());
+    OK(client.begin(Serial, 19200));
+    OK(client.poll());
     expect_exchange(client, client.readHoldingRegisters(request, 107, 3), {17, 3, 0, 107, 0, 3},
                     {17, 3, 6, 2, 43, 0, 0, 0, 100});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request.length(), 6);
     assert_int_equal(request[0], 555);
     assert_int_equal(request[1], 0);
@@ -31,7 +31,7 @@ CLIENT_TEST(an_exception_leaves_the_words)
     request[0] = 0x5555;
     expect_exchange(client, client.readInputRegisters(request, 8, 1), {17, 4, 0, 8, 0, 1},
                     {17, 0x84, 2});
-    assert_int_equal(request.status(), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.status());
     assert_int_equal(request.getExceptionCode(), 2);
     assert_int_equal(request[0], 0x5555);
 }
@@ -41,7 +41,7 @@ static unsigned calls;
 static void count_call(ModbusRequest &request)
 {
     calls++;
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
 }
 
 CLIENT_TEST(a_function_or_a_lambda_is_called_when_a_request_has_ended)
@@ -78,14 +78,14 @@ CLIENT_TEST(a_callback_may_replace_itself_and_send_a_request)
         first.onDone([&order, &times](ModbusRequest &) { order = order * 10 + 2, times++; });
         order = order * 10 + 1; // the captures of this callback still exist
         times++;
-        assert_int_equal(client.readHoldingRegisters(first, 1, 1), MBM_PENDING);
-        assert_int_equal(client.poll(), MBM_BUSY);
-        assert_int_equal(client.wait(first), MBM_BUSY);
-        assert_int_equal(client.begin(Serial), MBM_BUSY);
+        IS(MBM_PENDING, client.readHoldingRegisters(first, 1, 1));
+        IS(MBM_BUSY, client.poll());
+        IS(MBM_BUSY, client.wait(first));
+        IS(MBM_BUSY, client.begin(Serial));
     });
     Serial.reply(adu({17, 3, 2, 0, 1}));
     Serial.reply(adu({17, 3, 2, 0, 2}));
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 0, 1));
     run_until_idle(client);
     assert_int_equal(order, 12);
     assert_int_equal(times, 2);
@@ -112,17 +112,17 @@ CLIENT_TEST(requests_are_sent_in_their_order)
 CLIENT_TEST(a_pending_request_is_refused_and_unchanged)
 {
     ModbusRequestOf<1> request(17);
-    assert_int_equal(client.readHoldingRegisters(request, 5, 1), MBM_PENDING);
-    assert_int_equal(client.readInputRegisters(request, 6, 1), MBM_BUSY);
-    assert_int_equal(client.writeMultipleRegisters(request, 6, 2), MBM_BUSY);
-    assert_int_equal(request.setUnitID(4), MBM_BUSY);
-    assert_int_equal(client.begin(Serial), MBM_BUSY);
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 5, 1));
+    IS(MBM_BUSY, client.readInputRegisters(request, 6, 1));
+    IS(MBM_BUSY, client.writeMultipleRegisters(request, 6, 2));
+    IS(MBM_BUSY, request.setUnitID(4));
+    IS(MBM_BUSY, client.begin(Serial));
     assert_true(request.pending());
     Serial.reply(adu({17, 3, 2, 0, 1}));
     run_until_idle(client);
     assert_sent(Serial, {17, 3, 0, 5, 0, 1});
-    assert_int_equal(request.status(), MBM_OK);
-    assert_int_equal(request.setUnitID(4), MBM_OK);
+    OK(request.status());
+    OK(request.setUnitID(4));
     expect_exchange(client, client.readHoldingRegisters(request, 5, 1), {4, 3, 0, 5, 0, 1},
                     {4, 3, 2, 0, 2});
 }
@@ -131,18 +131,18 @@ CLIENT_TEST(a_request_refuses_a_unit_and_a_timeout_that_are_too_large)
 {
     ModbusRequestOf<1> request(17), beyond(300);
     assert_int_equal(beyond.getUnitID(), 300);
-    assert_int_equal(client.readHoldingRegisters(beyond, 5, 1), MBM_INVALID_ARGUMENT);
-    assert_int_equal(beyond.status(), MBM_INVALID_ARGUMENT);
-    assert_int_equal(request.setUnitID(300), MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, client.readHoldingRegisters(beyond, 5, 1));
+    IS(MBM_INVALID_ARGUMENT, beyond.status());
+    IS(MBM_INVALID_ARGUMENT, request.setUnitID(300));
     assert_int_equal(request.getUnitID(), 17);
-    assert_int_equal(request.setUnitID(255), MBM_OK);
-    assert_int_equal(request.setResponseTimeout(100000), MBM_OK);
-    assert_int_equal(request.setResponseTimeout(1000001), MBM_INVALID_ARGUMENT);
-    assert_int_equal(client.readHoldingRegisters(request, 5, 1), MBM_PENDING);
+    OK(request.setUnitID(255));
+    OK(request.setResponseTimeout(100000));
+    IS(MBM_INVALID_ARGUMENT, request.setResponseTimeout(1000001));
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 5, 1));
     const unsigned long before = millis();
     while (client.poll() == MBM_PENDING)
         assert_true(millis() - before < 200000);
-    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, request.status());
     assert_in_range(millis() - before, 100000, 100300);
     assert_int_equal(client.pending(), 0);
 }
@@ -177,33 +177,33 @@ CLIENT_TEST(a_request_has_its_own_timeout_and_retries)
 {
     ModbusRequestOf<1> request(17), other(17);
     client.setResponseTimeout(50);
-    assert_int_equal(request.setRetryLimit(1), MBM_OK);
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_INVALID_ARGUMENT);
+    OK(request.setRetryLimit(1));
+    IS(MBM_INVALID_ARGUMENT, client.readHoldingRegisters(request, 0, 1));
     client.setRetries(2);
-    assert_int_equal(request.setResponseTimeout(1500), MBM_OK);
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
-    assert_int_equal(request.setRetryLimit(0), MBM_BUSY);
-    assert_int_equal(request.setResponseTimeout(0), MBM_BUSY);
+    OK(request.setResponseTimeout(1500));
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 0, 1));
+    IS(MBM_BUSY, request.setRetryLimit(0));
+    IS(MBM_BUSY, request.setResponseTimeout(0));
     unsigned long before = millis();
     run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 2);
     assert_in_range(millis() - before, 3000, 3300);
-    assert_int_equal(request.setResponseTimeout(0), MBM_OK);
-    assert_int_equal(request.setRetryLimit(MBM_NO_RETRIES), MBM_OK);
+    OK(request.setResponseTimeout(0));
+    OK(request.setRetryLimit(MBM_NO_RETRIES));
     Serial.sent.clear();
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 0, 1));
     before = millis();
     run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 1);
     assert_in_range(millis() - before, 50, 200); // with the quiet time before
     Serial.sent.clear();
 
-    assert_int_equal(client.setBusyRetries(3, 20), MBM_OK);
+    OK(client.setBusyRetries(3, 20));
     Serial.reply(adu({17, 0x83, 6}));
     Serial.reply(adu({17, 3, 2, 0, 5}));
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 0, 1));
     run_until_idle(client);
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(Serial.sent.size(), 2);
     Serial.sent.clear();
 }
@@ -213,15 +213,15 @@ CLIENT_TEST(a_request_is_repeated_as_often_as_set)
     ModbusRequestOf<1> request(17);
     client.setResponseTimeout(50);
     client.setRetries(2);
-    assert_int_equal(client.setBackoff(MBM_BACKOFF_FIXED, 20, 20), MBM_OK);
-    assert_int_equal(client.readHoldingRegisters(request, 0, 1), MBM_PENDING);
+    OK(client.setBackoff(MBM_BACKOFF_FIXED, 20, 20));
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 0, 1));
     run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 3);
-    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, request.status());
     Serial.sent.clear();
     Serial.reply(raw({17, 3, 2, 0, 1, 0, 0})); // a wrong CRC
     Serial.reply(adu({17, 3, 2, 0, 5}));
-    assert_int_equal(client.wait((client.readHoldingRegisters(request, 0, 1), request)), MBM_OK);
+    OK(client.wait((client.readHoldingRegisters(request, 0, 1), request)));
     assert_int_equal(Serial.sent.size(), 2);
     assert_int_equal(request[0], 5);
 }
@@ -251,16 +251,16 @@ TEST(wait_returns_how_a_request_ended)
     Serial.reply(adu({17, 3, 2, 0, 5}));
     client.readHoldingRegisters(request, 0, 1);
     unsigned yields = board().yields;
-    assert_int_equal(client.wait(request), MBM_OK);
+    OK(client.wait(request));
     assert_true(board().yields > yields);
-    assert_int_equal(client.wait(request), MBM_OK); // returns at once
+    OK(client.wait(request)); // returns at once
     client.readHoldingRegisters(request, 0, 0);
-    assert_int_equal(client.wait(request), MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, client.wait(request));
     other.readHoldingRegisters(foreign, 0, 1);
-    assert_int_equal(client.wait(foreign), MBM_NOT_PENDING);
-    assert_int_equal(other.cancel(foreign), MBM_OK);
-    assert_int_equal(foreign.status(), MBM_CANCELLED);
-    assert_int_equal(other.cancel(foreign), MBM_NOT_PENDING);
+    IS(MBM_NOT_PENDING, client.wait(foreign));
+    OK(other.cancel(foreign));
+    IS(MBM_CANCELLED, foreign.status());
+    IS(MBM_NOT_PENDING, other.cancel(foreign));
 }
 
 CLIENT_TEST(the_driver_is_on_while_a_request_leaves)
@@ -285,13 +285,13 @@ CLIENT_TEST(a_driver_callback_can_call_nothing)
     called_client = &client;
     other_request = &another;
     client.preTransmission([] {
-        assert_int_equal(called_client->begin(Serial), MBM_BUSY);
-        assert_int_equal(called_client->poll(), MBM_BUSY);
-        assert_int_equal(called_client->readCoils(*other_request, 0, 1), MBM_BUSY);
+        IS(MBM_BUSY, called_client->begin(Serial));
+        IS(MBM_BUSY, called_client->poll());
+        IS(MBM_BUSY, called_client->readCoils(*other_request, 0, 1));
     });
     expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
                     {17, 3, 2, 0, 5});
-    assert_int_equal(another.status(), MBM_OK);
+    OK(another.status());
 }
 
 TEST(the_settings_of_the_line_reach_the_client)
@@ -300,9 +300,9 @@ TEST(the_settings_of_the_line_reach_the_client)
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
     client.begin(Serial, 9600);
-    assert_int_equal(client.setGap(30000), MBM_OK);
-    assert_int_equal(client.setQuietTime(200), MBM_OK);
-    assert_int_equal(client.setPostFlushHold(2), MBM_OK);
+    OK(client.setGap(30000));
+    OK(client.setQuietTime(200));
+    OK(client.setPostFlushHold(2));
     client.setResponseTimeout(50);
     client.postTransmission([] { released = board().now; });
     expect_exchange(client, client.readHoldingRegisters(request, 0, 1), {17, 3, 0, 0, 0, 1},
@@ -311,19 +311,19 @@ TEST(the_settings_of_the_line_reach_the_client)
     uint32_t before = board().now;
     client.readHoldingRegisters(request, 0, 1);
     run_until_idle(client);
-    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, request.status());
     assert_in_range(Serial.sentAt - before, 20000, 50000); // the gap, from the reply on
     before = board().now;
     client.readHoldingRegisters(request, 0, 1);
     run_until_idle(client);
     assert_in_range(Serial.sentAt - before, 200000, 220000); // the quiet time
     Serial.sent.clear();
-    assert_int_equal(client.begin(Serial, 9600), MBM_OK);
-    assert_int_equal(client.setEchoDiscard(true), MBM_OK);
+    OK(client.begin(Serial, 9600));
+    OK(client.setEchoDiscard(true));
     client.setResponseTimeout(50);
     expect_exchange(client, client.writeSingleRegister(request, 1, 2), {17, 6, 0, 1, 0, 2},
                     {17, 6, 0, 1, 0, 2});
-    assert_int_equal(request.status(), MBM_RESPONSE_TIMED_OUT); // that was the echo
+    IS(MBM_RESPONSE_TIMED_OUT, request.status()); // that was the echo
 }
 
 CLIENT_TEST(begin_resets_the_settings_of_a_client)
@@ -331,7 +331,7 @@ CLIENT_TEST(begin_resets_the_settings_of_a_client)
     ModbusRequestOf<1> request(17);
     client.setRetries(3);
     client.setResponseTimeout(20);
-    assert_int_equal(client.begin(Serial1, 19200), MBM_OK);
+    OK(client.begin(Serial1, 19200));
     client.setResponseTimeout(20);
     client.readHoldingRegisters(request, 0, 1);
     run_until_idle(client);
@@ -343,28 +343,28 @@ TEST(ascii_frames_go_both_ways)
 {
     ModbusSerialClient client;
     ModbusRequestOf<1> request(17);
-    assert_int_equal(client.beginAscii(Serial), MBM_OK);
+    OK(client.beginAscii(Serial));
     const char reply[] = ":110302022BBD\r\n", expected[] = ":1103006B000180\r\n";
     Serial.reply(Bytes(reply, reply + sizeof reply - 1));
-    assert_int_equal(client.readHoldingRegisters(request, 107, 1), MBM_PENDING);
+    IS(MBM_PENDING, client.readHoldingRegisters(request, 107, 1));
     run_until_idle(client);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], Bytes(expected, expected + sizeof expected - 1));
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request[0], 555);
-    assert_int_equal(client.setDelimiter('!'), MBM_OK);
+    OK(client.setDelimiter('!'));
 }
 
 CLIENT_TEST(a_broadcast_ends_without_a_response)
 {
     ModbusRequestOf<1> all(0);
     client.setTurnaroundDelay(30);
-    assert_int_equal(client.readCoils(all, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
-    assert_int_equal(client.writeSingleCoil(all, 1, true), MBM_PENDING);
+    IS(MBM_BROADCAST_NOT_ALLOWED, client.readCoils(all, 0, 1));
+    IS(MBM_PENDING, client.writeSingleCoil(all, 1, true));
     run_until_idle(client);
     assert_in_range(board().now - Serial.sentAt, 30000, 31000);
     assert_sent(Serial, {0, 5, 0, 1, 0xFF, 0});
-    assert_int_equal(all.status(), MBM_OK);
+    OK(all.status());
 }
 
 CLIENT_TEST(a_seventeenth_request_finds_the_queue_full)
@@ -375,11 +375,11 @@ CLIENT_TEST(a_seventeenth_request_finds_the_queue_full)
         {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1},
         {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}, {1, words, 1}};
     for (unsigned i = 0; i < 16; i++)
-        assert_int_equal(client.readCoils(requests[i], 0, 1), MBM_PENDING);
-    assert_int_equal(client.readCoils(requests[16], 0, 1), MBM_QUEUE_FULL);
-    assert_int_equal(requests[16].status(), MBM_QUEUE_FULL);
+        IS(MBM_PENDING, client.readCoils(requests[i], 0, 1));
+    IS(MBM_QUEUE_FULL, client.readCoils(requests[16], 0, 1));
+    IS(MBM_QUEUE_FULL, requests[16].status());
     for (unsigned i = 0; i < 16; i++)
-        assert_int_equal(client.cancel(requests[i]), MBM_OK);
+        OK(client.cancel(requests[i]));
     assert_int_equal(client.pending(), 0);
 }
 
@@ -392,8 +392,8 @@ TEST(a_units_record_counts_its_requests_and_delays_the_next)
     units[0].unit = 1;
     units[0].delayUs = 50000;
     client.begin(Serial, 19200);
-    assert_int_equal(client.setUnits(units), MBM_OK);
-    assert_int_equal(client.setCounters(&counters), MBM_OK);
+    OK(client.setUnits(units));
+    OK(client.setCounters(&counters));
     Serial.reply(adu({1, 3, 2, 0, 1}));
     Serial.reply(adu({1, 0x83, 2}));
     uint32_t begun = board().now;
@@ -404,7 +404,7 @@ TEST(a_units_record_counts_its_requests_and_delays_the_next)
     assert_int_equal(units[0].requests, 2);
     assert_int_equal(units[0].replies, 2);
     assert_int_equal(units[0].exceptions, 1);
-    assert_int_equal(units[0].status, MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, units[0].status);
     assert_int_equal(counters.requests, 2);
     assert_int_equal(counters.exceptions, 1);
 }
@@ -419,7 +419,7 @@ TEST(a_stream_that_returns_0_for_what_it_sends_works)
     client.readHoldingRegisters(request, 0, 1);
     run_until_idle(client);
     assert_sent(port, {17, 3, 0, 0, 0, 1});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
 }
 
 CLIENT_TEST(a_sketch_may_sleep_until_the_next_poll_is_due)

@@ -34,7 +34,7 @@ CLIENT_TEST(the_functions_of_a_serial_line_are_sent)
     words_of(request, {0xA537});
     expect_exchange(client, client.diagnostics(request, 0), {17, 8, 0, 0, 0xA5, 0x37},
                     {17, 8, 0, 0, 0xA5, 0x37});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     words_of(request, {0});
     expect_exchange(client, client.diagnostics(request, MBM_DIAGNOSTICS_BUS_MESSAGE_COUNT),
                     {17, 8, 0, 11, 0, 0}, {17, 8, 0, 11, 0, 99});
@@ -63,7 +63,7 @@ CLIENT_TEST(files_are_read_and_written)
     expect_exchange(client, client.writeFileRecord(request, 4, 7, 3),
                     {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D},
                     {17, 21, 13, 6, 0, 4, 0, 7, 0, 3, 6, 0xAF, 4, 0xBE, 0x10, 0x0D});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     static const uint8_t groups[] = {14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1};
     expect_exchange(client, client.forward(request, 20, groups, sizeof groups),
                     {17, 20, 14, 6, 0, 4, 0, 1, 0, 1, 6, 0, 3, 0, 9, 0, 1},
@@ -74,7 +74,7 @@ CLIENT_TEST(files_are_read_and_written)
     expect_exchange(client, client.forward(request, 21, record, sizeof record),
                     {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD},
                     {17, 21, 9, 6, 0, 4, 0, 7, 0, 1, 0xAB, 0xCD});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
 }
 
 CLIENT_TEST(a_device_identifies_itself)
@@ -82,14 +82,14 @@ CLIENT_TEST(a_device_identifies_itself)
     ModbusRequestOf<16> request(17);
     expect_exchange(client, client.readDeviceIdentification(request, MBM_DEVICE_ID_BASIC),
                     {17, 43, 14, 1, 0}, {17, 43, 14, 1, 1, 0, 0, 1, 0, 3, 'm', 'b', 'm'});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request.getByte(3), 1);
     assert_int_equal(request.getByte(5), 3);
     assert_int_equal(request.getByte(6), 'm');
     static const uint8_t canopen[] = {MBM_MEI_CANOPEN, 0x60};
     expect_exchange(client, client.forward(request, 43, canopen, sizeof canopen),
                     {17, 43, 13, 0x60}, {17, 43, 13, 0x60, 1, 2});
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request.length(), 4);
 }
 
@@ -129,28 +129,28 @@ TEST(values_of_each_type_and_order_are_in_the_words)
     request.setWordOrder(ModbusRequest::orderDCBA);
     assert_int_equal(request.getUInt32(0), 0x34126543);
     request.setWordOrder(ModbusRequest::orderABCD);
-    assert_int_equal(request.setFloat(2, 230.5f), MBM_OK);
+    OK(request.setFloat(2, 230.5f));
     assert_int_equal(words[2], 0x4366);
     assert_int_equal(words[3], 0x8000);
     assert_true(request.getFloat(2, value));
     assert_true(value == 230.5f);
-    assert_int_equal(request.setInt16(0, -2), MBM_OK);
+    OK(request.setInt16(0, -2));
     assert_int_equal(request.getInt16(0), -2);
-    assert_int_equal(request.setInt32(1, -70000), MBM_OK);
+    OK(request.setInt32(1, -70000));
     assert_int_equal(request.getInt32(1), -70000);
-    assert_int_equal(request.setUInt64(0, 0x0102030405060708u), MBM_OK);
+    OK(request.setUInt64(0, 0x0102030405060708u));
     assert_int_equal(words[0], 0x0102);
     assert_true(request.getUInt64(0) == 0x0102030405060708u);
-    assert_int_equal(request.setInt64(0, -5), MBM_OK);
+    OK(request.setInt64(0, -5));
     assert_true(request.getInt64(0) == -5);
-    assert_int_equal(request.setDouble(0, -1.25), MBM_OK);
+    OK(request.setDouble(0, -1.25));
     assert_true(request.getDouble(0) == -1.25);
-    assert_int_equal(request.setString(0, 8, "mbm", ModbusRequest::orderABCD), MBM_OK);
+    OK(request.setString(0, 8, "mbm", ModbusRequest::orderABCD));
     assert_int_equal(words[0], 'm' * 256 + 'b');
     assert_true(request.getString(0, 8, text, sizeof text));
     assert_string_equal(text, "mbm");
-    assert_int_equal(request.setUInt16(3, 7), MBM_OK);
-    assert_int_equal(request.setUInt32(2, 7), MBM_OK);
+    OK(request.setUInt16(3, 7));
+    OK(request.setUInt32(2, 7));
 }
 
 TEST(values_past_the_end_are_refused)
@@ -159,7 +159,7 @@ TEST(values_past_the_end_are_refused)
     ModbusRequest bare(1);
     uint32_t unchanged = 77;
     char text[9] = "as it is";
-    assert_int_equal(request.setFloat(1, 1.0f), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.setFloat(1, 1.0f));
     assert_int_equal(request[1], 0);
     assert_false(request.getUInt32(1, unchanged));
     assert_int_equal(unchanged, 77);
@@ -168,10 +168,10 @@ TEST(values_past_the_end_are_refused)
     assert_true(isnan(request.getDouble(0)));
     assert_false(request.getString(0, 5, text, sizeof text));
     assert_int_equal(text[0], 'a');
-    assert_int_equal(request.setBit(31, true), MBM_OK);
-    assert_int_equal(request.setBit(32, true), MBM_ILLEGAL_DATA_ADDRESS);
+    OK(request.setBit(31, true));
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.setBit(32, true));
     assert_false(request.getBit(32));
-    assert_int_equal(request.setByte(4, 1), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, request.setByte(4, 1));
     assert_int_equal(request.getByte(4), 0);
     assert_int_equal(bare.size(), 0);
     assert_int_equal(bare.getByte(0), 0);

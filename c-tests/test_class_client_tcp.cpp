@@ -47,23 +47,22 @@ static void run_until_idle()
 TEST(reads_what_libmodbus_holds)
 {
     ModbusRequestOf<125> request(255);
-    assert_int_equal(client->connect(device), MBM_OK);
+    OK(client->connect(device));
     assert_true(client->isConnected());
-    assert_int_equal(client->setInFlight(17), MBM_INVALID_ARGUMENT);
-    assert_int_equal(client->setInFlight(1), MBM_OK);
-    assert_int_equal(client->wait((client->readHoldingRegisters(request, 3, 125), request)),
-                     MBM_OK);
+    IS(MBM_INVALID_ARGUMENT, client->setInFlight(17));
+    OK(client->setInFlight(1));
+    OK(client->wait((client->readHoldingRegisters(request, 3, 125), request)));
     for (uint16_t i = 0; i < 125; i++)
         assert_int_equal(request[i], server_pattern(3u + i));
     assert_int_equal(request.length(), 250);
-    assert_int_equal(client->readCoils(request, 5, 2000), MBM_PENDING);
+    IS(MBM_PENDING, client->readCoils(request, 5, 2000));
     run_until_idle();
     for (uint16_t i = 0; i < 2000; i++)
         assert_int_equal(request.getBit(i), server_bit_pattern(5u + i));
-    assert_int_equal(client->readDiscreteInputs(request, 7, 3), MBM_PENDING);
+    IS(MBM_PENDING, client->readDiscreteInputs(request, 7, 3));
     run_until_idle();
     assert_int_equal(request.getBit(0), !server_bit_pattern(7));
-    assert_int_equal(client->readInputRegisters(request, 9, 1), MBM_PENDING);
+    IS(MBM_PENDING, client->readInputRegisters(request, 9, 1));
     run_until_idle();
     assert_int_equal(request[0], static_cast<uint16_t>(~server_pattern(9)));
 }
@@ -74,8 +73,7 @@ TEST(writes_reach_libmodbus)
     client->connect("device");
     request.setFloat(0, 21.5f);
     request.setInt32(2, -3);
-    assert_int_equal(client->wait((client->writeMultipleRegisters(request, 40, 4), request)),
-                     MBM_OK);
+    OK(client->wait((client->writeMultipleRegisters(request, 40, 4), request)));
     assert_int_equal(peer.mapping->tab_registers[40], 0x41AC);
     assert_int_equal(peer.mapping->tab_registers[43], 0xFFFD);
     assert_int_equal(client->wait((client->writeSingleRegister(request, 50, 0xBEEF), request)), 0);
@@ -83,26 +81,25 @@ TEST(writes_reach_libmodbus)
     assert_int_equal(client->wait((client->maskWriteRegister(request, 50, 0xFF00, 0x12), request)),
                      0);
     assert_int_equal(peer.mapping->tab_registers[50], 0xBE12);
-    assert_int_equal(client->wait((client->writeSingleCoil(request, 30, true), request)), MBM_OK);
+    OK(client->wait((client->writeSingleCoil(request, 30, true), request)));
     assert_int_equal(peer.mapping->tab_bits[30], 1);
     request[0] = 5;
-    assert_int_equal(client->wait((client->writeMultipleCoils(request, 60, 3), request)), MBM_OK);
+    OK(client->wait((client->writeMultipleCoils(request, 60, 3), request)));
     assert_int_equal(peer.mapping->tab_bits[60], 1);
     assert_int_equal(peer.mapping->tab_bits[61], 0);
     assert_int_equal(peer.mapping->tab_bits[62], 1);
     request[0] = 0x7777;
-    assert_int_equal(
-        client->wait((client->readWriteMultipleRegisters(request, 70, 1, 70, 1), request)), MBM_OK);
+    OK(client->wait((client->readWriteMultipleRegisters(request, 70, 1, 70, 1), request)));
     assert_int_equal(request[0], 0x7777);
-    assert_int_equal(client->wait((client->readHoldingRegisters(request, 499, 2), request)),
-                     MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS,
+       client->wait((client->readHoldingRegisters(request, 499, 2), request)));
 }
 
 TEST(many_requests_are_in_flight_at_once)
 {
     ModbusRequestOf<1> a(255), b(255), c(255);
     unsigned sum = 0;
-    assert_int_equal(client->setInFlight(16), MBM_OK);
+    OK(client->setInFlight(16));
     client->connect(device);
     a.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
     b.onDone([&sum](ModbusRequest &reply) { sum += reply[0]; });
@@ -125,9 +122,9 @@ TEST(a_client_that_takes_few_bytes_gets_all_of_them)
     ethernet->writeSpace = 5;
     for (uint16_t i = 0; i < 123; i++)
         request[i] = static_cast<uint16_t>(1000u + i);
-    assert_int_equal(client->writeMultipleRegisters(request, 10, 123), MBM_PENDING);
+    IS(MBM_PENDING, client->writeMultipleRegisters(request, 10, 123));
     run_until_idle();
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(peer.mapping->tab_registers[132], 1122);
 }
 
@@ -135,16 +132,16 @@ TEST(without_a_connection_requests_end_at_once)
 {
     ModbusTcpClient other;
     ModbusRequestOf<1> request(255);
-    assert_int_equal(other.connect(device), MBM_NOT_INITIALISED);
+    IS(MBM_NOT_INITIALISED, other.connect(device));
     assert_false(other.isConnected());
     assert_false(client->isConnected());
     client->readHoldingRegisters(request, 0, 1);
     run_until_idle();
-    assert_int_equal(request.status(), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, request.status());
     uint16_t unusedPort;
     int reserved = tcp_reserve(&unusedPort);
     networkPort(502) = unusedPort;
-    assert_int_equal(client->connect(device), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, client->connect(device));
     close(reserved);
 }
 
@@ -152,20 +149,19 @@ TEST(a_lost_connection_can_be_made_again)
 {
     ModbusRequestOf<1> request(255);
     client->connect(device);
-    assert_int_equal(client->wait((client->readHoldingRegisters(request, 8, 1), request)), MBM_OK);
+    OK(client->wait((client->readHoldingRegisters(request, 8, 1), request)));
     tcp_server_stop(&peer);
     AWAIT(!client->isConnected());
     client->readHoldingRegisters(request, 8, 1);
     run_until_idle();
-    assert_int_equal(request.status(), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, request.status());
     tcp_server_start(&peer);
     networkPort(502) = peer.port;
     request[0] = 0;
-    assert_int_equal(client->readHoldingRegisters(request, 8, 1),
-                     MBM_PENDING); // stays in the queue
-    assert_int_equal(client->connect(device), MBM_OK);
+    IS(MBM_PENDING, client->readHoldingRegisters(request, 8, 1)); // stays in the queue
+    OK(client->connect(device));
     run_until_idle();
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request[0], server_pattern(8));
 }
 
@@ -175,15 +171,15 @@ TEST(replies_in_any_order_find_their_requests)
     ModbusRequestOf<1> late(7), early(7);
     tcp_peer_fault(faulty, 1, FAULT_DELAY, 300);
     networkPort(502) = tcp_peer_start(faulty, 0);
-    assert_int_equal(client->setInFlight(16), MBM_OK);
+    OK(client->setInFlight(16));
     client->connect(device);
     client->readHoldingRegisters(late, 11, 1);
     client->readHoldingRegisters(early, 12, 1);
     AWAIT((client->poll(), !early.pending()));
-    assert_int_equal(early.status(), MBM_OK);
+    OK(early.status());
     assert_true(late.pending());
     run_until_idle();
-    assert_int_equal(late.status(), MBM_OK);
+    OK(late.status());
     assert_int_equal(early[0], tcp_peer_word(12));
     assert_int_equal(late[0], tcp_peer_word(11));
     client->stop();
@@ -202,7 +198,7 @@ TEST(poll_never_waits_for_a_device)
     while (client->poll() == MBM_PENDING)
         polls++;
     assert_true(polls > 10);
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     client->stop();
     tcp_peer_stop(faulty);
 }
@@ -213,9 +209,9 @@ TEST(rtu_frames_are_sent_over_a_tcp_connection)
     int listener = tcp_listen(&port);
     ModbusRequestOf<1> request(17);
     networkPort(4001) = port;
-    assert_int_equal(client->beginRtuOverTcp(*ethernet), MBM_OK);
+    OK(client->beginRtuOverTcp(*ethernet));
     client->setResponseTimeout(PATIENCE_MS);
-    assert_int_equal(client->connect(device, 4001), MBM_OK);
+    OK(client->connect(device, 4001));
     int converter = accept(listener, nullptr, nullptr);
     client->readHoldingRegisters(request, 107, 1);
     client->poll();
@@ -224,7 +220,7 @@ TEST(rtu_frames_are_sent_over_a_tcp_connection)
     assert_bytes(seen, expected);
     assert_int_equal(send(converter, reply.data(), reply.size(), 0), reply.size());
     run_until_idle();
-    assert_int_equal(request.status(), MBM_OK);
+    OK(request.status());
     assert_int_equal(request[0], 555);
     close(converter);
     close(listener);
@@ -236,9 +232,9 @@ TEST(begin_is_refused_while_a_request_is_pending)
     ModbusRequestOf<1> request(255);
     client->connect(device);
     client->readHoldingRegisters(request, 8, 1);
-    assert_int_equal(client->begin(another), MBM_BUSY);
+    IS(MBM_BUSY, client->begin(another));
     run_until_idle();
-    assert_int_equal(request.status(), MBM_OK);
-    assert_int_equal(client->begin(another), MBM_OK);
+    OK(request.status());
+    OK(client->begin(another));
     assert_false(client->isConnected());
 }

@@ -29,10 +29,10 @@ static void start()
     wifi->begin();
     line->begin(tty, 115200);
     line->setResponseTimeout(PATIENCE_MS);
-    assert_int_equal(gateway->poll(), MBM_NOT_INITIALISED);
-    assert_int_equal(gateway->begin(*wifi, *line, 0), MBM_INVALID_ARGUMENT);
-    assert_int_equal(gateway->begin(*wifi, *line, 273, 274), MBM_INVALID_ARGUMENT);
-    assert_int_equal(gateway->begin(*wifi, *line, 17, 18), MBM_OK);
+    IS(MBM_NOT_INITIALISED, gateway->poll());
+    IS(MBM_INVALID_ARGUMENT, gateway->begin(*wifi, *line, 0));
+    IS(MBM_INVALID_ARGUMENT, gateway->begin(*wifi, *line, 273, 274));
+    OK(gateway->begin(*wifi, *line, 17, 18));
 }
 
 static void stop()
@@ -48,7 +48,7 @@ fixture each_test = {start, stop};
 /* Returns the result of a client's call, while the sketch's loop polls the gateway. */
 static int passes(modbus_t *peer, int (*call)(modbus_t *))
 {
-    return result_of(peer, call, [] { assert_int_equal(gateway->poll(), MBM_OK); });
+    return result_of(peer, call, [] { OK(gateway->poll()); });
 }
 
 static modbus_t *client_of(int unit)
@@ -133,7 +133,7 @@ TEST(clients_and_the_sketch_share_the_line)
     ModbusRequestOf<1> own(17);
     for (unsigned round = 0; round < 3; round++)
         for (modbus_t *peer : peers) {
-            assert_int_equal(line->readHoldingRegisters(own, 9, 1), MBM_PENDING);
+            IS(MBM_PENDING, line->readHoldingRegisters(own, 9, 1));
             assert_int_equal(passes(peer, read_registers), 125);
             AWAIT((gateway->poll(), !own.pending()));
             assert_int_equal(own[0], server_pattern(9));
@@ -152,7 +152,7 @@ TEST(closing_a_connection_cancels_its_request)
     hasty.write(request, sizeof request);
     AWAIT((gateway->poll(), line->pending() == 1)); // unit 18 does not exist
     // The gateway does not read a client whose request is pending. begin closes all of them.
-    assert_int_equal(gateway->begin(*wifi, *line), MBM_OK);
+    OK(gateway->begin(*wifi, *line));
     assert_int_equal(line->pending(), 0);
     assert_int_equal(gateway->connections(), 0);
     modbus_t *peer = client_of(17);

@@ -25,7 +25,7 @@ static uint8_t reads(uint32_t limit)
     while (status == ModbusMaster::ku8MBPending) {
         if (board().now - began >= limit) {
             node.cancel();
-            assert_int_equal(node.status(), MBM_CANCELLED);
+            IS(MBM_CANCELLED, node.status());
             return MBM_CANCELLED;
         }
         board().now += 100;
@@ -91,7 +91,7 @@ TEST(a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line)
     begin();
     other.begin(2, Serial);
     node.setBlocking(false);
-    assert_int_equal(reads(50 * MS), MBM_CANCELLED);
+    IS(MBM_CANCELLED, reads(50 * MS));
     board().now += 150 * MS;
     assert_int_equal(node.readHoldingRegisters(0, 1), ModbusMaster::ku8MBPending);
     for (int i = 0; i < 100; i++)
@@ -101,7 +101,7 @@ TEST(a_node_that_waits_for_its_unit_does_not_keep_another_one_from_the_line)
     assert_int_equal(other.readHoldingRegisters(0, 1), 0);
     assert_int_equal(other.getResponseBuffer(0), 9);
     assert_in_range(board().now - began, 0, 30 * MS);
-    assert_int_equal(node.poll(), MBM_CANCELLED);
+    IS(MBM_CANCELLED, node.poll());
 }
 
 /* It is refused, and the pending one still reads from its own Stream. */

@@ -69,9 +69,9 @@ TEST(callbacks_around_a_request_may_use_the_words)
 static uint8_t begin_other(const mbm_access &)
 {
     entered++;
-    assert_int_equal(polled->begin(9, elsewhere, 9600), MBM_BUSY);
-    assert_int_equal(polled->beginAscii(9, elsewhere), MBM_BUSY);
-    assert_int_equal(polled->poll(), MBM_BUSY);
+    IS(MBM_BUSY, polled->begin(9, elsewhere, 9600));
+    IS(MBM_BUSY, polled->beginAscii(9, elsewhere));
+    IS(MBM_BUSY, polled->poll());
     assert_int_equal(polled->getUnitID(), 17);
     polled->setBaudRate(300);
     return 0;
@@ -86,8 +86,8 @@ TEST(hooks_cannot_begin_their_server)
     ModbusHooks hooks;
     hooks.beforeWrite(begin_other);
     registers.setHooks(hooks);
-    assert_int_equal(server.holdingRegisters(registers), MBM_OK);
-    assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
+    OK(server.holdingRegisters(registers));
+    OK(server.begin(17, Serial, 19200));
     expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
     expect_response(server, {17, 6, 0, 1, 0, 6}, {17, 6, 0, 1, 0, 6});
     assert_int_equal(entered, 2);
@@ -99,10 +99,10 @@ TEST(several_units_may_serve_one_array)
     ModbusRegisterArray<2> registers;
     ModbusUnit units[] = {{17}, {18}};
     ModbusServer server;
-    assert_int_equal(units[0].holdingRegisters(registers), MBM_OK);
-    assert_int_equal(units[1].holdingRegisters(registers), MBM_OK);
-    assert_int_equal(units[1].inputRegisters(registers), MBM_BUSY);
-    assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
+    OK(units[0].holdingRegisters(registers));
+    OK(units[1].holdingRegisters(registers));
+    IS(MBM_BUSY, units[1].inputRegisters(registers));
+    OK(server.begin(units, Serial, 19200));
     expect_response(server, {17, 6, 0, 1, 0, 5}, {17, 6, 0, 1, 0, 5});
     expect_response(server, {18, 3, 0, 1, 0, 1}, {18, 3, 2, 0, 5});
 }

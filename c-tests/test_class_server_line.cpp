@@ -88,14 +88,14 @@ TEST(a_serial_port_with_a_fifo_hands_over_each_byte)
     ModbusServer server;
     ModbusUnit units[1] = {{17}};
     FifoSerial one, other, refused;
-    assert_int_equal(server.begin(17, one, 19200), MBM_OK);
+    OK(server.begin(17, one, 19200));
     assert_int_equal(one.threshold, 1);
-    assert_int_equal(server.begin(units, other), MBM_OK);
+    OK(server.begin(units, other));
     assert_int_equal(other.threshold, 1);
-    assert_int_equal(server.begin(256, refused), MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, server.begin(256, refused));
     assert_int_equal(refused.threshold, 120);
     // Known only as a Stream, it keeps its threshold.
-    assert_int_equal(server.begin(17, static_cast<Stream &>(refused)), MBM_OK);
+    OK(server.begin(17, static_cast<Stream &>(refused)));
     assert_int_equal(refused.threshold, 120);
 }
 
@@ -115,7 +115,7 @@ TEST(the_time_that_an_adapter_takes_can_be_set)
         run_loop(server);
         assert_int_equal(Serial.sent.size(), i);
         Serial.sent.clear();
-        assert_int_equal(server.setReceiveLatency(120), MBM_OK);
+        OK(server.setReceiveLatency(120));
     }
 }
 
@@ -265,12 +265,12 @@ TEST(ascii_is_served)
     Bytes answer(response, response + sizeof response - 1);
     server.holdingRegisters(registers);
     units[0].holdingRegisters(registers);
-    assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
+    OK(server.beginAscii(17, Serial));
     receive(server, frame);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], answer);
     Serial.sent.clear();
-    assert_int_equal(server.beginAscii(units, Serial), MBM_OK);
+    OK(server.beginAscii(units, Serial));
     receive(server, frame);
     assert_int_equal(Serial.sent.size(), 1);
     assert_bytes(Serial.sent[0], answer);
@@ -283,7 +283,7 @@ TEST(a_baud_rate_does_not_change_the_timeout_of_ascii)
     static const char request[] = ":110300000001EB\r\n";
     Bytes frame(request, request + sizeof request - 1);
     server.holdingRegisters(registers);
-    assert_int_equal(server.beginAscii(17, Serial), MBM_OK);
+    OK(server.beginAscii(17, Serial));
     server.setBaudRate(19200);
     Serial.arrive(frame, board().now + 100, 3000);
     for (int i = 0; i < 4; i++)
@@ -303,7 +303,7 @@ TEST(begin_may_be_called_again)
 {
     ModbusRegisterArray<1> registers;
     ModbusServer server;
-    assert_int_equal(server.poll(), MBM_NOT_INITIALISED);
+    IS(MBM_NOT_INITIALISED, server.poll());
     assert_int_equal(server.pollDelay(), 0xFFFFFFFF);
     server.begin(17, Serial1, 19200);
     server.holdingRegisters(registers);

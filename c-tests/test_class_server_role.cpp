@@ -10,11 +10,11 @@ TEST(registers_and_bits_of_arrays_are_served)
     ModbusRegisters holding(words, 100), some(words, 2, 7);
     ModbusBits coils(bytes), inputs(bytes, 3, 20);
     ModbusServer server;
-    assert_int_equal(server.holdingRegisters(holding), MBM_OK);
-    assert_int_equal(server.inputRegisters(some), MBM_OK);
-    assert_int_equal(server.coils(coils), MBM_OK);
-    assert_int_equal(server.discreteInputs(inputs), MBM_OK);
-    assert_int_equal(server.begin(17, Serial, 19200), MBM_OK);
+    OK(server.holdingRegisters(holding));
+    OK(server.inputRegisters(some));
+    OK(server.coils(coils));
+    OK(server.discreteInputs(inputs));
+    OK(server.begin(17, Serial, 19200));
     expect_response(server, {17, 3, 0, 100, 0, 3}, {17, 3, 6, 0x11, 0x11, 0x22, 0x22, 0x33, 0x33});
     expect_response(server, {17, 3, 0, 99, 0, 1}, {17, 0x83, 2});
     expect_response(server, {17, 3, 0, 101, 0, 3}, {17, 0x83, 2});
@@ -138,7 +138,7 @@ TEST(mask_write_and_read_write_are_served_after_maskAndReadWrite)
     server.begin(17, Serial, 19200);
     registers[0] = 0x0012;
     expect_response(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 0x96, 1});
-    assert_int_equal(server.maskAndReadWrite(registers), MBM_OK);
+    OK(server.maskAndReadWrite(registers));
     expect_response(server, {17, 22, 0, 0, 0, 0xF2, 0, 0x25}, {17, 22, 0, 0, 0, 0xF2, 0, 0x25});
     assert_int_equal(registers[0], 0x0017);
     expect_response(server, {17, 23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 7, 8}, {17, 23, 4, 0, 0x17, 7, 8});
@@ -158,7 +158,7 @@ TEST(each_of_several_units_serves_its_own_tables)
     ModbusServer server;
     units[0].holdingRegisters(left);
     units[1].holdingRegisters(right);
-    assert_int_equal(server.begin(units, Serial, 19200), MBM_OK);
+    OK(server.begin(units, Serial, 19200));
     expect_response(server, {5, 6, 0, 0, 0, 5}, {5, 6, 0, 0, 0, 5});
     expect_response(server, {6, 6, 0, 0, 0, 6}, {6, 6, 0, 0, 0, 6});
     assert_int_equal(left[0], 5);
@@ -180,10 +180,10 @@ TEST(a_unit_id_above_255_is_refused)
     ModbusUnit units[2];
     units[1].setUnitID(300);
     server.holdingRegisters(holding);
-    assert_int_equal(server.begin(7, Serial, 19200), MBM_OK);
-    assert_int_equal(server.begin(263, Serial, 19200), MBM_INVALID_ARGUMENT);
-    assert_int_equal(server.beginAscii(256, Serial), MBM_INVALID_ARGUMENT);
-    assert_int_equal(server.begin(units, Serial, 19200), MBM_INVALID_ARGUMENT);
+    OK(server.begin(7, Serial, 19200));
+    IS(MBM_INVALID_ARGUMENT, server.begin(263, Serial, 19200));
+    IS(MBM_INVALID_ARGUMENT, server.beginAscii(256, Serial));
+    IS(MBM_INVALID_ARGUMENT, server.begin(units, Serial, 19200));
     assert_int_equal(server.getUnitID(), 7);
     expect_response(server, {7, 3, 0, 0, 0, 1}, {7, 3, 2, 0, 0});
 }
@@ -202,8 +202,8 @@ TEST(a_function_of_the_sketch_is_served)
 {
     ModbusFunction sum(65, adds), none(66, nullptr);
     ModbusServer server;
-    assert_int_equal(server.function(sum), MBM_OK);
-    assert_int_equal(server.function(none), MBM_INVALID_ARGUMENT);
+    OK(server.function(sum));
+    IS(MBM_INVALID_ARGUMENT, server.function(none));
     server.begin(17, Serial, 19200);
     expect_response(server, {17, 65, 3, 4}, {17, 65, 7});
     expect_response(server, {17, 65, 3}, {17, 65 | 0x80, 3});
@@ -218,10 +218,10 @@ TEST(a_function_can_be_switched_off_and_on)
     ModbusServer server;
     server.holdingRegisters(registers);
     server.begin(17, Serial, 19200);
-    assert_int_equal(server.switchOff(switches, 6), MBM_OK);
+    OK(server.switchOff(switches, 6));
     expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 0x86, 1});
     expect_response(server, {17, 3, 0, 0, 0, 1}, {17, 3, 2, 0, 0});
-    assert_int_equal(server.switchOn(switches, 6), MBM_OK);
+    OK(server.switchOn(switches, 6));
     expect_response(server, {17, 6, 0, 0, 0, 9}, {17, 6, 0, 0, 0, 9});
 }
 
@@ -259,13 +259,13 @@ TEST(the_other_functions_are_served_from_their_records)
     identification.objects = &object;
     identification.count = 1;
     cells.get = address_itself;
-    assert_int_equal(server.serve(status), MBM_OK);
-    assert_int_equal(server.serve(diagnostics), MBM_OK);
-    assert_int_equal(server.serve(id), MBM_OK);
-    assert_int_equal(server.serve(files), MBM_OK);
-    assert_int_equal(server.serve(fifos), MBM_OK);
-    assert_int_equal(server.serve(identification), MBM_OK);
-    assert_int_equal(server.serve(cells, 4), MBM_OK);
+    OK(server.serve(status));
+    OK(server.serve(diagnostics));
+    OK(server.serve(id));
+    OK(server.serve(files));
+    OK(server.serve(fifos));
+    OK(server.serve(identification));
+    OK(server.serve(cells, 4));
     server.begin(17, Serial, 19200);
     expect_response(server, {17, 7}, {17, 7, 0x6D});
     expect_response(server, {17, 8, 0, 0, 0xA5, 0x37}, {17, 8, 0, 0, 0xA5, 0x37});

@@ -11,7 +11,7 @@ static void receive(const Bytes &bytes)
 {
     Serial.inject(bytes);
     for (unsigned i = 0; i < 1000; i++)
-        assert_int_equal(server.poll(), MBM_OK);
+        OK(server.poll());
 }
 
 static void start()

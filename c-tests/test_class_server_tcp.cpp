@@ -21,7 +21,7 @@ private:
 template <typename Server>
 static int serves(Server &server, modbus_t *peer, int (*call)(modbus_t *))
 {
-    return result_of(peer, call, [&server] { assert_int_equal(server.poll(), MBM_OK); });
+    return result_of(peer, call, [&server] { OK(server.poll()); });
 }
 
 static void real_time()
@@ -40,13 +40,13 @@ template <typename Listener> static void each_function_is_served()
     ModbusTcpServer<Listener> server;
     ModbusRegisterArray<8> holding;
     ModbusBitArray<8> coils;
-    assert_int_equal(server.poll(), MBM_NOT_INITIALISED);
+    IS(MBM_NOT_INITIALISED, server.poll());
     listener.begin();
     server.holdingRegisters(holding);
     server.maskAndReadWrite(holding);
     server.coils(coils);
-    assert_int_equal(server.begin(7, listener), MBM_OK);
-    assert_int_equal(server.begin(263, listener), MBM_INVALID_ARGUMENT);
+    OK(server.begin(7, listener));
+    IS(MBM_INVALID_ARGUMENT, server.begin(263, listener));
     assert_int_equal(server.getUnitID(), 7);
     holding[2] = 0xBEEF;
     coils.set(1, true);
@@ -196,7 +196,7 @@ TEST(requests_reach_the_unit_they_address)
     units[1].holdingRegisters(second);
     first[0] = 11;
     second[0] = 22;
-    assert_int_equal(server.begin(units, listener), MBM_OK);
+    OK(server.begin(units, listener));
     modbus_t *peer = connect_client(502, 2);
     assert_int_equal(serves(server, peer, read_first), 22);
     modbus_set_slave(peer, 255);
@@ -218,8 +218,8 @@ TEST(a_hook_cannot_poll_or_begin_its_server)
     ModbusHooks hooks;
     holding.setHooks(hooks);
     hooks.afterWrite([](const mbm_access &) {
-        assert_int_equal(polled->poll(), MBM_BUSY);
-        assert_int_equal(polled->begin(9, *again), MBM_BUSY);
+        IS(MBM_BUSY, polled->poll());
+        IS(MBM_BUSY, polled->begin(9, *again));
     });
     server.holdingRegisters(holding);
     server.begin(1, listener);
@@ -229,7 +229,7 @@ TEST(a_hook_cannot_poll_or_begin_its_server)
     assert_int_equal(holding[0], 8);
     assert_int_equal(server.getUnitID(), 1);
     // begin closes the connections.
-    assert_int_equal(server.begin(3, listener), MBM_OK);
+    OK(server.begin(3, listener));
     assert_int_equal(server.connections(), 0);
     assert_int_equal(serves(server, peer, read_first), -1);
     close_client(peer);

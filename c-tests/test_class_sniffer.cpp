@@ -49,7 +49,7 @@ struct Listening {
     Listening()
     {
         sniffer.printTo(paper);
-        assert_int_equal(sniffer.begin(Serial, 19200), MBM_OK);
+        OK(sniffer.begin(Serial, 19200));
     }
 };
 
@@ -94,9 +94,9 @@ TEST(exceptions_and_silent_units_are_printed)
     Listening l;
     ModbusSniffer &sniffer = l.sniffer;
     Paper &paper = l.paper;
-    assert_int_equal(sniffer.setResponseTimeout(200), MBM_OK);
-    assert_int_equal(sniffer.setFrameTimeout(0), MBM_INVALID_ARGUMENT);
-    assert_int_equal(sniffer.setFrameTimeout(50), MBM_OK);
+    OK(sniffer.setResponseTimeout(200));
+    IS(MBM_INVALID_ARGUMENT, sniffer.setFrameTimeout(0));
+    OK(sniffer.setFrameTimeout(50));
     prints(sniffer, paper, adu({17, 3, 0, 107, 0, 3}));
     std::string text = prints(sniffer, paper, adu({17, 0x83, 2}));
     const char exception[] = "unit 17 exception 03 read holding registers 107..109: code 02 (";
@@ -163,7 +163,7 @@ TEST(ascii_frames_are_printed_too)
     ModbusSniffer sniffer;
     Paper paper;
     sniffer.printTo(paper);
-    assert_int_equal(sniffer.beginAscii(Serial), MBM_OK);
+    OK(sniffer.beginAscii(Serial));
     const char request[] = ":1103006B000180\r\n";
     PRINTS("unit 17 request 03 read holding registers 107",
            Bytes(request, request + sizeof request - 1));
