@@ -15,8 +15,8 @@ static asker a;
 
 static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
 {
-    assert_int_equal(queued, MBM_PENDING);
-    assert_int_equal(request->status, MBM_PENDING);
+    IS(MBM_PENDING, queued);
+    IS(MBM_PENDING, request->status);
     assert_int_equal(asker_wait(&a, request), status);
 }
 
@@ -128,7 +128,7 @@ TEST(sixteen_requests_are_pipelined)
         IS(MBM_QUEUE_FULL, mbm_client_readHoldingRegisters(&a.client, &requests[i], 0, 1));
         asker_wait_all(&a);
         for (i = 0; i < MBM_CLIENT_DEPTH; i++) {
-            assert_int_equal(requests[i].status, MBM_OK);
+            OK(requests[i].status);
             assert_memory_equal(words[i], s.mapping->tab_registers + 10 * i, 20);
         }
     }
@@ -151,8 +151,8 @@ TEST(a_lost_connection_is_reported_and_made_anew)
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &waiting, 0, 1));
     asker_wait_all(&a);
-    assert_int_equal(r.status, MBM_LINK_LOST);
-    assert_int_equal(waiting.status, MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, r.status);
+    IS(MBM_LINK_LOST, waiting.status);
     assert_false(mbm_client_isConnected(&a.client));
     IS(MBM_PENDING, mbm_client_reconnect(&a.client, &a.link));
     assert_false(mbm_client_isConnected(&a.client));
@@ -169,7 +169,7 @@ static uint8_t polled_inside;
 static void queue_again(void *context, mbm_clientRequest *request)
 {
     assert_ptr_equal(context, &a);
-    assert_int_equal(request->status, MBM_OK);
+    OK(request->status);
     polled_inside = mbm_client_poll(&a.client);
     if (++called < 4)
         IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, request, 0, 1));
@@ -189,7 +189,7 @@ TEST(a_callback_may_queue_and_may_not_poll)
     IS(MBM_BUSY, mbm_client_readHoldingRegisters(&a.client, &r, 0, 1));
     asker_wait_all(&a);
     assert_int_equal(called, 4);
-    assert_int_equal(polled_inside, MBM_BUSY);
+    IS(MBM_BUSY, polled_inside);
     mbm_tcp_close(&a.tcp);
     tcp_server_stop(&s);
 }
@@ -226,7 +226,7 @@ TEST(the_master_uses_the_line_between_the_clients_requests)
     OK(mbm_node_status(&node));
     OK(mbm_client_resume(&a.client, &line));
     IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&a.client, &line));
-    assert_int_equal(asker_wait(&a, &r), MBM_OK);
+    OK(asker_wait(&a, &r));
     assert_memory_equal(words, more, sizeof words);
     IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&node, 0, 4));
     server_stop(&s);
@@ -272,7 +272,7 @@ TEST(bad_calls_are_refused_with_a_status)
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readFileRecord(c, &r, 0, 0, 1));
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_client_readFileRecord(c, &r, 1, 9999, 2));
     IS(MBM_INVALID_ARGUMENT, mbm_client_custom(c, &r, 0x41, 0, NULL));
-    assert_int_equal(r.status, MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, r.status);
     assert_int_equal(mbm_client_pending(c), 0);
 
     r.unit = UNIT;
@@ -285,7 +285,7 @@ TEST(bad_calls_are_refused_with_a_status)
     OK(mbm_client_cancel(c, &r));
     OK(mbm_client_cancel(c, &other));
     IS(MBM_NOT_PENDING, mbm_client_cancel(c, &r));
-    assert_int_equal(r.status, MBM_CANCELLED);
+    IS(MBM_CANCELLED, r.status);
     IS(MBM_INVALID_ARGUMENT, mbm_client_cancel(c, NULL));
     assert_int_equal(mbm_client_pending(c), 0);
     OK(mbm_client_poll(c));

@@ -338,7 +338,7 @@ static void queue_read(unsigned i)
 
 static void is_right(unsigned i)
 {
-    assert_int_equal(requests[i].status, MBM_OK);
+    OK(requests[i].status);
     for (unsigned word = 0; word < WORDS; word++)
         assert_int_equal(words[i][word], tcp_peer_word(20 * i + word));
 }

@@ -12,7 +12,7 @@ static served s;
 
 static void ends(uint8_t status, mbm_clientRequest *request, uint8_t queued)
 {
-    assert_int_equal(queued, MBM_PENDING);
+    IS(MBM_PENDING, queued);
     assert_int_equal(asker_wait(&a, request), status);
 }
 
@@ -217,7 +217,7 @@ TEST(the_ascii_delimiter_follows_the_devices)
     set_in_done = MBM_PENDING;
     ends(MBM_OK, &r,
          mbm_client_diagnostics(&a.client, &r, MBM_DIAGNOSTICS_CHANGE_ASCII_INPUT_DELIMITER, 1));
-    assert_int_equal(set_in_done, MBM_OK);
+    OK(set_in_done);
     r = asker_request(SERVED_UNIT, words, sizeof words, NULL);
     ends(MBM_OK, &r, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
     assert_reply(&r, s.words, 4);
@@ -239,7 +239,7 @@ TEST(a_delimiter_is_refused_while_a_request_is_pending)
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, SERVED_BASE, 2));
     (void)mbm_client_poll(&a.client);
     IS(MBM_BUSY, mbm_client_setDelimiter(&a.client, '!'));
-    assert_int_equal(asker_wait(&a, &r), MBM_OK);
+    OK(asker_wait(&a, &r));
     end();
 }
 
@@ -261,7 +261,7 @@ static uint32_t most_in_flight(void)
         asker_rest(&a);
     }
     for (unsigned i = 0; i < MBM_CLIENT_DEPTH; i++) {
-        assert_int_equal(requests[i].status, MBM_OK);
+        OK(requests[i].status);
         assert_int_equal(words[i], s.words[i]);
     }
     return most;

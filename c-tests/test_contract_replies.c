@@ -38,7 +38,7 @@ SIM_TEST(exception_codes_of_the_device_are_returned_unchanged)
 
 SIM_TEST(a_bad_crc_fails_after_t35_and_not_after_the_timeout)
 {
-    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    IS(MBM_INVALID_CRC, read_words(s, 1, "11 03 02 00 01 00 00"));
     uint64_t over = s->frames[0].end + 500 + 7 * s->character;
     assert_in_range(s->now, over + 4000, over + 4100);
 }
@@ -69,10 +69,10 @@ SIM_TEST(all_125_registers_and_2000_bits_are_readable)
 SIM_TEST(an_exception_after_noise_that_looks_like_a_longer_reply_is_found)
 {
     (void)n;
-    assert_int_equal(read_words(s, 10, "11 03 14 00 / 11 83 02 +"), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, read_words(s, 10, "11 03 14 00 / 11 83 02 +"));
     sim_answer(s, 1, 500, "11 03 14 00");
     sim_answer(s, 1, 20000, "11 83 02 +");
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 10), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_readHoldingRegisters(n, 0, 10));
     assert_true(s->now - s->frames[1].end < 30000);
 }
 
@@ -149,8 +149,7 @@ SIM_TEST(a_damaged_echo_does_not_hide_the_reply)
 SIM_TEST(noise_before_the_echo_does_not_hide_a_foreign_frame_after_it)
 {
     OK(mbm_line_setEchoDiscard(&s->line, 1));
-    assert_int_equal(read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"),
-                     MBM_INVALID_SLAVE_ID);
+    IS(MBM_INVALID_SLAVE_ID, read_words(s, 1, "00 / 11 03 00 00 00 01 + / 12 03 02 00 01 +"));
     assert_int_equal(s->counters.foreignFrames, 1);
 }
 
@@ -159,10 +158,10 @@ SIM_TEST(an_echo_alone_is_no_success)
     OK(mbm_line_setEchoDiscard(&s->line, 1));
     OK(mbm_node_setResponseTimeout(n, 100));
     s->echo = 1;
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_node_writeSingleCoil(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_node_writeMultipleRegisters(n, 1, 2), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(mbm_node_maskWriteRegister(n, 1, 2, 3), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleRegister(n, 1, 2));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleCoil(n, 1, 1));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeMultipleRegisters(n, 1, 2));
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_maskWriteRegister(n, 1, 2, 3));
 }
 
 SIM_TEST(with_discard_off_an_echo_that_is_no_reply_is_skipped)
@@ -184,8 +183,8 @@ SIM_TEST(counters_count_what_happened)
     mbm_node_setResponseTimeout(n, 100);
     recovers_at_once(s);
     assert_int_equal(read_words(s, 1, "11 83 02 +"), 2);
-    assert_int_equal(read_words(s, 1, ""), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(read_words(s, 1, "11 03 02 00 01 00 00"), MBM_INVALID_CRC);
+    IS(MBM_RESPONSE_TIMED_OUT, read_words(s, 1, ""));
+    IS(MBM_INVALID_CRC, read_words(s, 1, "11 03 02 00 01 00 00"));
     assert_int_equal(s->counters.resynchronisations, 0);
     assert_int_equal(s->counters.requests, 4);
     assert_int_equal(s->counters.replies, 2);

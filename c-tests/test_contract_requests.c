@@ -202,9 +202,9 @@ SIM_TEST(words_beyond_the_transmit_buffer_are_not_queued)
     mbm_node_beginTransmission(n, 0);
     for (unsigned i = 0; i < 123; i++)
         OK(mbm_node_send(n, 1));
-    assert_int_equal(mbm_node_send(n, 3), MBM_BUFFER_TOO_SMALL);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_send(n, 3));
     assert_int_equal(s->transmit[122], 1);
-    assert_int_equal(mbm_node_sendBit(n, 1), MBM_BUFFER_TOO_SMALL);
+    IS(MBM_BUFFER_TOO_SMALL, mbm_node_sendBit(n, 1));
     sim_answer(s, 1, 100, "11 10 00 00 00 7B +");
     OK(mbm_node_writeQueuedRegisters(n));
     assert_int_equal(s->frames[0].length, 9 + 2 * 123);
@@ -217,9 +217,9 @@ SIM_TEST(any_transaction_empties_the_queue_but_keeps_the_words)
     sim_answer(s, 1, 100, "11 03 02 00 01 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     /* A quantity of 0 gets the status that a device would return. Nothing is sent. */
-    assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
-    assert_int_equal(mbm_node_writeQueuedCoils(n), MBM_ILLEGAL_DATA_VALUE);
-    assert_int_equal(mbm_node_readWriteQueuedRegisters(n, 0, 1), MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_writeQueuedRegisters(n));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_writeQueuedCoils(n));
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_readWriteQueuedRegisters(n, 0, 1));
     assert_int_equal(s->sent, 1);
     assert_int_equal(s->transmit[0], 0x1234);
 }
@@ -232,9 +232,9 @@ SIM_TEST(a_failed_transaction_empties_the_queue_and_rewinds_receive)
     mbm_node_beginTransmission(n, 5);
     mbm_node_send(n, 0x1234);
     sim_answer(s, 1, 100, "11 86 04 +");
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 2), MBM_SERVER_DEVICE_FAILURE);
+    IS(MBM_SERVER_DEVICE_FAILURE, mbm_node_writeSingleRegister(n, 1, 2));
     assert_int_equal(mbm_node_receive(n), 1);
-    assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_writeQueuedRegisters(n));
 }
 
 SIM_TEST(the_write_address_is_shared_by_all_writing_functions)
@@ -301,9 +301,9 @@ SIM_TEST(begin_is_cheap_and_switches_slaves)
     assert_int_equal(WORD(0), 7);
     assert_int_equal(s->transmit[3], 0x4711);
     /* The queue is empty, the settings stay. */
-    assert_int_equal(mbm_node_writeQueuedRegisters(n), MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, mbm_node_writeQueuedRegisters(n));
     s->limit = s->now + 100000;
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
 /* One transaction of the contract with programs for ModbusMaster: the order of its steps
@@ -339,19 +339,19 @@ SIM_TEST(bytes_are_counted_as_they_are_sent)
     for (unsigned again = 0; again < 2; again++) {
         const unsigned before = again * 8;
 
-        assert_int_equal(sim_read_one(s), MBM_PENDING);
+        IS(MBM_PENDING, sim_read_one(s));
         while (s->counters.bytesSent < before + 8) {
             const uint32_t sent = s->sent > again ? s->frames[again].length : 0;
 
             assert_int_equal(s->counters.bytesSent, before + sent);
             assert_int_equal(s->counters.requests, again + (sent > 0));
-            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            IS(MBM_PENDING, mbm_node_poll(n));
             s->now += s->idle_step;
         }
         /* The last byte has not left yet. The end of the request counts nothing again. */
         assert_true(s->now < s->transmitted);
         while (s->driver_on) {
-            assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+            IS(MBM_PENDING, mbm_node_poll(n));
             s->now += s->idle_step;
         }
         OK(mbm_node_cancel(n));
@@ -364,7 +364,7 @@ SIM_TEST(a_request_of_which_the_port_takes_no_byte_is_counted)
 {
     OK(mbm_node_setResponseTimeout(n, 100));
     s->write_never = 1;
-    assert_int_equal(sim_read_one(s), MBM_LINE_BUSY);
+    IS(MBM_LINE_BUSY, sim_read_one(s));
     assert_int_equal(s->counters.requests, 1);
     assert_int_equal(s->counters.bytesSent, 0);
 }
@@ -387,11 +387,11 @@ SIM_TEST(a_client_counts_bytes_as_they_are_sent)
         else
             OK(mbm_client_beginRtu(&client, &s->port, frame, sizeof frame));
         OK(mbm_client_setCounters(&client, &counters));
-        assert_int_equal(mbm_client_writeSingleRegister(&client, &request, 0, 1), MBM_PENDING);
+        IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 0, 1));
         while (counters.bytesSent < length) {
             const uint32_t before = counters.bytesSent;
 
-            assert_int_equal(mbm_client_poll(&client), MBM_PENDING);
+            IS(MBM_PENDING, mbm_client_poll(&client));
             assert_in_range(counters.bytesSent, before, before + 1);
             s->now += s->idle_step;
         }

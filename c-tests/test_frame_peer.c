@@ -202,7 +202,7 @@ static void answers_what_we_parse(int fd, const mbm_framing *f, const modbus_map
     request_reply(fd, f, (mbm_packet){.function = 0x03, .address = 0xFF00, .quantity = 1}, frame,
                   &reply);
     assert_int_equal(reply.kind, MBM_PACKET_EXCEPTION);
-    assert_int_equal(reply.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, reply.exceptionCode);
 }
 
 TEST(mbm_parses_the_responses_of_libmodbus_over_rtu)
@@ -312,7 +312,7 @@ TEST(a_tcp_frame_that_is_cut_or_changed_is_parsed_right_or_refused)
                 frame[at] ^= (uint8_t)flip;
                 status = parsed(&tcp, side, frame, length);
                 if (at == 2 || at == 3 || at == 4)
-                    assert_int_equal(status, MBM_MALFORMED_FRAME);
+                    IS(MBM_MALFORMED_FRAME, status);
                 if (at == 5)
                     assert_true(status == MBM_MALFORMED_FRAME || status == MBM_INCOMPLETE_FRAME);
                 frame[at] ^= (uint8_t)flip;

@@ -113,7 +113,7 @@ TEST(all_objects_are_read_with_as_many_requests_as_it_takes)
     read_all(MBM_DEVICE_ID_EXTENDED);
     ANSWER(0xFF, 2, 2, "\x00\x03mbm\x01\x00");
     assert_int_equal(handed, 2);
-    assert_int_equal(id.request.status, MBM_PENDING);
+    IS(MBM_PENDING, id.request.status);
     ANSWER(0xFF, 0x80, 1, "\x02\x01v");
     ANSWER(0, 0, 1, "\xFF\x02\x00\x01");
     assert_ended(MBM_OK, 4);
@@ -255,7 +255,7 @@ TEST(an_exception_ends_it_with_that_status)
     memory_port_bytes(&m, frame, sizeof frame);
     (void)mbm_client_poll(&client);
     assert_ended(MBM_ILLEGAL_DATA_ADDRESS, 1);
-    assert_int_equal(id.request.exception, MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, id.request.exception);
 }
 
 TEST(a_device_that_falls_silent_ends_it_with_a_timeout)
@@ -294,9 +294,9 @@ TEST(others_may_fill_the_queue_meanwhile)
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 1, 1, "\x00\x01m");
     in_object = NULL;
-    assert_int_equal(id.request.status, MBM_PENDING);
+    IS(MBM_PENDING, id.request.status);
     ANSWER(0, 0, 1, "\x01\x01n");
-    assert_int_equal(id.request.status, MBM_OK);
+    OK(id.request.status);
     assert_int_equal(handed, 2);
     assert_int_equal(ended, 1);
 }
@@ -312,7 +312,7 @@ TEST(cancelling_in_object_ends_the_calls)
     in_object = cancel;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
-    assert_int_equal(id.request.status, MBM_CANCELLED);
+    IS(MBM_CANCELLED, id.request.status);
     assert_int_equal(handed, 1);
     assert_int_equal(ended, 0);
     assert_int_equal(mbm_client_pending(&client), 0);
@@ -329,7 +329,7 @@ TEST(it_may_be_cancelled_between_two_replies)
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 1, "\x00\x01m");
     OK(mbm_client_cancel(&client, &id.request));
-    assert_int_equal(id.request.status, MBM_CANCELLED);
+    IS(MBM_CANCELLED, id.request.status);
     (void)mbm_client_poll(&client);
     assert_int_equal(ended, 0);
     read_all(MBM_DEVICE_ID_BASIC);
@@ -340,7 +340,7 @@ TEST(beginning_the_client_again_gives_it_up)
     in_object = begin_port;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0xFF, 2, 2, "\x00\x01m\x01\x01n");
-    assert_int_equal(id.request.status, MBM_CANCELLED);
+    IS(MBM_CANCELLED, id.request.status);
     assert_int_equal(handed, 1);
     assert_int_equal(ended, 0);
     in_object = NULL;
@@ -406,11 +406,11 @@ TEST(done_may_read_the_next)
     id.done = read_the_next;
     read_all(MBM_DEVICE_ID_BASIC);
     ANSWER(0, 0, 1, "\x00\x01m");
-    assert_int_equal(id.request.status, MBM_PENDING);
+    IS(MBM_PENDING, id.request.status);
     handed = 0;
     ANSWER(0, 0, 1, "\x03\x01u");
     assert_int_equal(ended, 2);
-    assert_int_equal(id.request.status, MBM_OK);
+    OK(id.request.status);
     assert_memory_equal(requested, "\x00\x03", 2);
 }
 

@@ -53,7 +53,7 @@ static uint8_t read_at(sim *s, uint16_t address)
 
 DEVICE_TEST(one_late_reply_does_not_shift_the_answers_of_later_requests)
 {
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     for (uint16_t i = 1; i < 100; i++)
         assert_reads(s, i, 1);
     assert_int_equal(s->counters.foreignFrames, 1);
@@ -70,14 +70,14 @@ DEVICE_TEST(a_late_reply_does_not_shift_the_answers_after_a_retry)
 /* The frame buffer has space for one reply of this length, not for two. */
 DEVICE_TEST(a_late_reply_of_the_longest_length_does_not_shift_later_answers)
 {
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(n, 0, REGISTERS));
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
 
 DEVICE_TEST(a_late_reply_to_a_write_of_the_same_value_costs_one_request)
 {
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 5), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleRegister(n, 1, 5));
     for (unsigned i = 0; i < 10; i++)
         OK(mbm_node_writeSingleRegister(n, 1, 5));
     assert_reads(s, 9, 1);
@@ -99,7 +99,7 @@ DEVICE_TEST(several_late_replies_in_a_row_are_all_skipped)
 DEVICE_TEST(a_late_reply_just_before_the_deadline_of_the_next_request_is_no_answer)
 {
     d->takes_for_late = 1000 * (TIMEOUT_MS + TIMEOUT_MS) + QUIET - 1000;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     for (uint16_t i = 1; i < 50; i++)
         assert_reads(s, i, 1);
 }
@@ -112,7 +112,7 @@ DEVICE_TEST(a_late_exception_is_not_the_answer_to_a_later_request)
         renew();
         device_is_late(d, LATE);
         d->exception = codes[i];
-        assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+        IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
         assert_reads(s, 1, 1);
         assert_int_equal(mbm_node_getExceptionCode(n), 0);
         assert_reads(s, 2, 1);
@@ -133,8 +133,8 @@ DEVICE_TEST(after_an_exception_in_time_no_reply_is_held)
 DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 {
     d->damaged = 2;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(read_at(s, 1), MBM_INVALID_CRC);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
+    IS(MBM_INVALID_CRC, read_at(s, 1));
     assert_int_equal(s->response[0], 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
@@ -143,8 +143,8 @@ DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_damaged)
 DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 {
     d->cut = 2;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
-    assert_int_equal(read_at(s, 1), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 1));
     assert_int_equal(s->response[0], 0);
     assert_reads(s, 2, 1);
     assert_reads(s, 3, 1);
@@ -154,11 +154,11 @@ DEVICE_TEST(a_held_reply_is_no_answer_if_the_next_one_is_cut_off)
 DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 {
     d->trailing = 1;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, i, 1);
     d->requests = 0;
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, REGISTERS), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(n, 0, REGISTERS));
     for (uint16_t i = 1; i < 10; i++)
         assert_reads(s, (uint16_t)(i * REGISTERS), REGISTERS);
 }
@@ -166,7 +166,7 @@ DEVICE_TEST(a_byte_of_noise_after_a_held_reply_does_not_spoil_it)
 DEVICE_TEST(after_a_timeout_the_next_reply_costs_one_more_response_timeout_and_nothing_else)
 {
     d->takes_for_late = 0xFFFFFFFF; /* no reply */
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     renew();
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, 1000 * TIMEOUT_MS, 1000 * TIMEOUT_MS + SIM_SLACK);
@@ -181,7 +181,7 @@ DEVICE_TEST(after_a_damaged_reply_the_next_reply_costs_one_quiet_time)
 {
     d->late = 0;
     d->damaged = 1;
-    assert_int_equal(read_at(s, 0), MBM_INVALID_CRC);
+    IS(MBM_INVALID_CRC, read_at(s, 0));
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
 }
@@ -191,15 +191,15 @@ DEVICE_TEST(a_program_that_polls_late_does_not_lengthen_the_hold)
     d->late = 0;
     d->damaged = 1;
     OK(mbm_node_setBlocking(n, 0));
-    assert_int_equal(read_at(s, 0), MBM_PENDING);
+    IS(MBM_PENDING, read_at(s, 0));
     while (s->sent == 0 || s->now < s->frames[0].end + 1000) {
-        assert_int_equal(mbm_node_poll(n), MBM_PENDING);
+        IS(MBM_PENDING, mbm_node_poll(n));
         s->now += 100;
     }
     s->now += 600000000;
     while (mbm_node_poll(n) == MBM_PENDING)
         s->now += 100;
-    assert_int_equal(mbm_node_status(n), MBM_INVALID_CRC);
+    IS(MBM_INVALID_CRC, mbm_node_status(n));
     OK(mbm_node_setBlocking(n, 1));
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, QUIET, QUIET + SIM_SLACK);
@@ -243,7 +243,7 @@ DEVICE_TEST(without_a_quiet_time_no_reply_is_held)
 {
     OK(mbm_line_setQuietTime(&s->line, 0));
     d->takes_for_late = 0xFFFFFFFF;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     renew();
     assert_reads(s, 1, 1);
     assert_in_range(s->now - s->last_byte, 0, SIM_SLACK);
@@ -252,7 +252,7 @@ DEVICE_TEST(without_a_quiet_time_no_reply_is_held)
 /* Unit 18 answers between the failed request to unit 17 and the late reply. */
 DEVICE_TEST(the_reply_of_another_unit_does_not_end_the_holding)
 {
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     OK(mbm_node_setSlaveID(n, 18));
     assert_reads(s, 5, 1);
     sim_assert_time(s->now - s->last_byte, 0);
@@ -314,13 +314,13 @@ DEVICE_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_end
     /* The device owes more replies than are counted, so each one is held. */
     d->takes_for_late = 0xFFFFFFFF;
     for (unsigned i = 0; i < 40; i++)
-        assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+        IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     s->device = NULL;
     /* One reply every 80 ms, from the end of the next request on. */
     for (at = s->now + QUIET + 10000; at < s->now + 4000000; at += 80000)
         sim_deliver(s, at, frame, length);
     at = s->now;
-    assert_int_equal(read_at(s, 7), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 7));
     assert_in_range(s->now - at, 1000 * TIMEOUT_MS, 1000 * 3 * TIMEOUT_MS + QUIET + 1000);
 }
 
@@ -328,7 +328,7 @@ DEVICE_TEST(a_device_that_never_stops_answering_does_not_keep_a_request_from_end
 DEVICE_TEST(the_last_reply_that_the_unit_owes_is_delivered_at_once)
 {
     d->takes_for_late = LATE;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     for (uint16_t i = 1; i < 4; i++) {
         OK(read_at(s, i));
         assert_int_equal(s->response[0], fault_value(i));
@@ -345,14 +345,14 @@ DEVICE_TEST(a_program_that_sleeps_as_pollDelay_says_waits_for_three_timeouts_at_
     uint64_t at, sent;
 
     d->takes_for_late = 0xFFFFFFFF;
-    assert_int_equal(read_at(s, 0), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, read_at(s, 0));
     s->device = NULL;
     /* The last reply arrives shortly before the wait is over. */
     for (at = s->now + QUIET + 10000; at < s->now + QUIET + 1000 * 3 * TIMEOUT_MS - 30000;
          at += 10000)
         sim_deliver(s, at, frame, length);
     OK(mbm_node_setBlocking(n, 0));
-    assert_int_equal(read_at(s, 7), MBM_PENDING);
+    IS(MBM_PENDING, read_at(s, 7));
     while (mbm_node_poll(n) == MBM_PENDING)
         sleep_until_a_byte(s, mbm_node_pollDelay(n), UINT64_MAX);
     sent = s->frames[s->sent - 1].end;

@@ -41,9 +41,9 @@ LENIENT_TEST(without_it_the_same_replies_are_malformed)
 {
     OK(mbm_node_setLenient(n, 0));
     sim_answer(s, 1, 500, "11 06 00 01 00 08 +");
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
+    IS(MBM_MALFORMED_REPLY, mbm_node_writeSingleRegister(n, 1, 7));
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 +");
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_MALFORMED_REPLY);
+    IS(MBM_MALFORMED_REPLY, mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
 LENIENT_TEST(a_read_takes_the_registers_that_come)
@@ -128,7 +128,7 @@ LENIENT_TEST(a_right_reply_is_better_before_and_after_it)
     OK(mbm_node_writeSingleRegister(n, 1, 7));
     assert_true(s->now - s->frames[2].end < 100000);
     sim_answer(s, 1, 500, "11 06 00 01 00 08 + / 11 86 02 +");
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_node_writeSingleRegister(n, 1, 7));
 }
 
 LENIENT_TEST(half_a_reply_in_front_hides_no_right_one)
@@ -170,7 +170,7 @@ LENIENT_TEST(what_is_no_reply_to_the_request_is_not_accepted)
     sim_answer(s, 1, 500, "11 10 00 01 00 01 02 00 00 +"); /* an echo */
     assert_int_not_equal(mbm_node_writeMultipleRegisters(n, 1, 1), MBM_OK);
     sim_answer(s, 1, 500, "11 86 00 +");
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_MALFORMED_REPLY);
+    IS(MBM_MALFORMED_REPLY, mbm_node_writeSingleRegister(n, 1, 7));
 }
 
 /* A reply of 125 registers: values 0 to 124. */
@@ -212,7 +212,7 @@ LENIENT_TEST(a_read_of_more_words_than_the_buffer_fills_it)
         assert_int_equal(s->response[64], 0xFFFF);
         assert_true(s->now - s->frames[s->sent - 1].end < 255 * s->character + 20000);
         OK(mbm_node_setLenient(n, 0));
-        assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 125), MBM_BUFFER_TOO_SMALL);
+        IS(MBM_BUFFER_TOO_SMALL, mbm_node_readHoldingRegisters(n, 0, 125));
         OK(mbm_node_setLenient(n, 1));
     }
 }
@@ -241,7 +241,7 @@ LENIENT_TEST(a_small_frame_buffer_is_not_left)
             assert_int_equal(s->response[0], 0);
             assert_in_range(mbm_node_available(n), 1, (size - 3) / 2);
         } else {
-            assert_int_equal(status, MBM_BUFFER_TOO_SMALL);
+            IS(MBM_BUFFER_TOO_SMALL, status);
             assert_true(size < 20);
         }
         OK(mbm_line_setFrame(&s->line, s->buffer, 255));
@@ -257,34 +257,34 @@ LENIENT_TEST(a_read_from_unit_0_is_sent_and_its_reply_accepted)
     sim_assert_sent(s, 0, "00 03 00 00 00 01 +");
     assert_int_equal(s->response[0], 0x2A);
     assert_true(s->now - s->frames[0].end < 170000);
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(n, 0, 1));
     assert_in_range(s->now - s->frames[1].end, TIMEOUT, TIMEOUT + 500);
     /* A write is a broadcast as before. */
     OK(mbm_node_writeSingleRegister(n, 1, 2));
     assert_in_range(s->now - s->frames[2].end, 100000, 100500);
     OK(mbm_node_setLenient(n, 0));
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_BROADCAST_NOT_ALLOWED);
+    IS(MBM_BROADCAST_NOT_ALLOWED, mbm_node_readHoldingRegisters(n, 0, 1));
 }
 
 LENIENT_TEST(it_cannot_be_set_while_a_request_is_pending)
 {
     OK(mbm_node_setBlocking(n, 0));
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 0, 1), MBM_PENDING);
-    assert_int_equal(mbm_node_setLenient(n, 0), MBM_BUSY);
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(n, 0, 1));
+    IS(MBM_BUSY, mbm_node_setLenient(n, 0));
     sim_answer(s, 1, 500, "11 03 04 00 01 00 02 +");
     OK(sim_poll(s));
     assert_int_equal(mbm_node_available(n), 2);
     OK(mbm_node_setLenient(n, 0));
-    assert_int_equal(mbm_node_setLenient(NULL, 1), MBM_INVALID_ARGUMENT);
+    IS(MBM_INVALID_ARGUMENT, mbm_node_setLenient(NULL, 1));
 }
 
 /* After a failure a reply is held, for it may be the late one. */
 LENIENT_TEST(a_late_reply_that_deviates_is_not_better_than_the_next)
 {
-    assert_int_equal(mbm_node_writeSingleRegister(n, 1, 7), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_writeSingleRegister(n, 1, 7));
     sim_answer(s, 1, 500, "11 06 00 01 00 07 + / 11 06 00 02 00 08 +");
     OK(mbm_node_writeSingleRegister(n, 2, 8));
-    assert_int_equal(mbm_node_readHoldingRegisters(n, 1, 1), MBM_RESPONSE_TIMED_OUT);
+    IS(MBM_RESPONSE_TIMED_OUT, mbm_node_readHoldingRegisters(n, 1, 1));
     sim_answer(s, 1, 500, "11 03 02 00 01 + / 11 03 04 00 02 00 03 +");
     OK(mbm_node_readHoldingRegisters(n, 2, 2));
     assert_int_equal(mbm_node_available(n), 2);

@@ -285,7 +285,7 @@ TEST(a_terminal_that_is_not_there_yet_or_was_unplugged_is_opened_when_it_comes)
         UNTIL(counters.lost == i);
     }
     mbm_tty_close(&a.tty);
-    assert_int_equal(mbm_tty_connect(&a.tty), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, mbm_tty_connect(&a.tty));
     assert_int_equal(a.tty.error, EBADF);
     FAILS(EBADF, mbm_tty_wait(&a.tty, 0));
     rmdir(folder);
@@ -305,6 +305,6 @@ TEST(a_terminal_that_cannot_be_noted_is_refused)
     FAILS(EBADF, mbm_tty_wait(&tty, 0));
     /* One that could not be opened is not opened later. */
     FAILS(ENOENT, mbm_tty_openWith(&tty, "/dev/there-is-none", &right));
-    assert_int_equal(mbm_tty_connect(&tty), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, mbm_tty_connect(&tty));
     assert_int_equal(tty.error, EBADF);
 }

@@ -56,7 +56,7 @@ TEST(every_sub_function_of_08_is_built_and_parsed)
             assert_same_packet(&found, &packet);
             known++;
         } else {
-            assert_int_equal(status, MBM_ILLEGAL_FUNCTION);
+            IS(MBM_ILLEGAL_FUNCTION, status);
         }
         packet.kind = MBM_PACKET_RESPONSE;
         /* Force Listen Only Mode has no response. */

@@ -91,7 +91,7 @@ TEST(a_plan_that_begins_again_gives_its_requests_up)
     assert_int_equal(mbm_client_pending(&d.client), 1);
     plan_device_start(&d);
     assert_int_equal(mbm_client_pending(&d.client), 0);
-    assert_int_equal(d.requests[0].status, MBM_CANCELLED);
+    IS(MBM_CANCELLED, d.requests[0].status);
     OK(mbm_plan_poll(&d.plan));
     assert_int_equal(mbm_client_pending(&d.client), 1);
     /* A setup that is not complete is refused before anything is given up. */
@@ -362,7 +362,7 @@ TEST(a_conversion_of_registers_refuses_null_and_what_the_registers_lack)
     const uint16_t words[2] = {1, 2};
     mbm_registers one, empty = {0};
 
-    assert_int_equal(mbm_registers_ofWords(&one, words, 2, 1), MBM_OK);
+    OK(mbm_registers_ofWords(&one, words, 2, 1));
     GETS(MBM_OK, mbm_registers_getConverted(&one, fields, 0, 0, NULL, &value.number));
     GETS(MBM_OK, mbm_registers_getDecimal(&one, fields, 0, 0, NULL, 0, &value.int32));
     IS(MBM_OK, mbm_registers_checkAvailable(&one, fields, 0, 0, NULL));
@@ -376,7 +376,7 @@ TEST(a_conversion_of_registers_refuses_null_and_what_the_registers_lack)
     GETS(MBM_NOT_INITIALISED,
          mbm_registers_getConverted(&empty, fields, 0, 0, NULL, &value.number));
     IS(MBM_NOT_INITIALISED, mbm_registers_checkAvailable(&empty, fields, 0, 0, NULL));
-    assert_int_equal(mbm_registers_ofWords(&one, words, 1, 1), MBM_OK);
+    OK(mbm_registers_ofWords(&one, words, 1, 1));
     IS(MBM_ILLEGAL_DATA_ADDRESS, mbm_registers_checkAvailable(&one, fields, 1, 0, NULL));
 }
 
@@ -429,7 +429,7 @@ static void within_port(int hook)
         if (status_in_hooks == MBM_OK)
             every_value_is_there();
     });
-    assert_int_equal(d.requests[0].status, MBM_PENDING);
+    IS(MBM_PENDING, d.requests[0].status);
 }
 
 static void begin_hooked(void)

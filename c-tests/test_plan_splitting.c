@@ -249,7 +249,7 @@ static void expect_scaled(double expected)
 {
     double value = 0;
 
-    assert_int_equal(mbm_plan_getConverted(&d.plan, 0, 0, &power, &value), MBM_OK);
+    OK(mbm_plan_getConverted(&d.plan, 0, 0, &power, &value));
     assert_true(value == expected);
 }
 
@@ -257,7 +257,7 @@ static void expect_nothing(void)
 {
     double value;
 
-    assert_int_equal(mbm_plan_getConverted(&d.plan, 0, 0, &power, &value), MBM_NOT_AVAILABLE);
+    IS(MBM_NOT_AVAILABLE, mbm_plan_getConverted(&d.plan, 0, 0, &power, &value));
 }
 
 TEST(a_power_of_ten_that_comes_to_lie_in_another_read_is_found_there)

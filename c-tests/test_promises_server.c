@@ -274,7 +274,7 @@ TEST(a_function_that_is_off_is_illegal)
         assert_int_equal(response_to_read(17, 0), round == 1 ? 5 : 7);
         assert_int_equal(frame[1], round == 1 ? 0x83 : 3);
         if (round == 1)
-            assert_int_equal(frame[2], MBM_ILLEGAL_FUNCTION);
+            IS(MBM_ILLEGAL_FUNCTION, frame[2]);
         OK(mbm_unit_switchFunction(&unit, &mask, 3, round == 1));
     }
 }

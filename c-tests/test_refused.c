@@ -255,7 +255,7 @@ static void answers_with_exception_04(uint8_t framing, mbm_unit *served, const c
     assert_true(response <= capacity);
     assert_int_equal(response, framing == MBM_FRAMING_TCP ? 9 : 5);
     assert_int_equal(frame[pdu], (uint8_t)request[pdu] | 0x80);
-    assert_int_equal(frame[pdu + 1], MBM_SERVER_DEVICE_FAILURE);
+    IS(MBM_SERVER_DEVICE_FAILURE, frame[pdu + 1]);
     free(frame);
 }
 

@@ -196,7 +196,7 @@ EXCHANGES_TEST(the_reply_of_a_refused_request_is_an_exception_packet)
     IS(MBM_PENDING, ask(asked));
     IS(MBM_SERVER_DEVICE_FAILURE, answer(kind, &refusal, received, &wanted));
     assert_reply_is(&wanted);
-    assert_int_equal(wanted.exceptionCode, MBM_SERVER_DEVICE_FAILURE);
+    IS(MBM_SERVER_DEVICE_FAILURE, wanted.exceptionCode);
 }
 
 TEST(one_file_record_has_its_head_again)
@@ -326,7 +326,7 @@ TEST(a_refused_request_does_not_keep_an_earlier_exception)
     begin(MBM_FRAMING_TCP);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
     IS(MBM_ILLEGAL_DATA_VALUE, answer(MBM_FRAMING_TCP, &refusal, received, &wanted));
-    assert_int_equal(request.exception, MBM_ILLEGAL_DATA_VALUE);
+    IS(MBM_ILLEGAL_DATA_VALUE, request.exception);
     IS(MBM_ILLEGAL_DATA_VALUE, mbm_client_readHoldingRegisters(&client, &request, 0, 0));
     assert_int_equal(request.exception, 0);
     refuses(MBM_ILLEGAL_DATA_VALUE);
@@ -528,7 +528,7 @@ static void check_fields(void)
 
     reads(mbm_client_readHoldingRegisters(&client, &request, 0, 1));
     assert_int_equal(packet.kind, MBM_PACKET_EXCEPTION);
-    assert_int_equal(packet.exceptionCode, MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, packet.exceptionCode);
 }
 
 static void with_each_framing(void (*check)(void))

@@ -173,7 +173,7 @@ static uint8_t client_reads(world *w, mbm_client *c, uint8_t unit, uint16_t addr
 {
     mbm_clientRequest request = {.unit = unit, .reply = value, .replyBytes = sizeof *value};
 
-    assert_int_equal(mbm_client_readHoldingRegisters(c, &request, address, 1), MBM_PENDING);
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(c, &request, address, 1));
     while (request.status == MBM_PENDING) {
         sleep_until_a_byte(w, mbm_client_pollDelay(c));
         (void)mbm_client_poll(c);

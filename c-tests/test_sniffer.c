@@ -78,7 +78,7 @@ TEST(a_request_and_its_reply_are_reported_with_values_in_each_framing)
         feed(frame, frame_of(kind, reply, sizeof reply, MBM_PACKET_RESPONSE, frame));
         assert_int_equal(mbm_sniffer_next(&sniffer, now, &event), 1);
         assert_int_equal(event.kind, MBM_EVENT_REPLY);
-        assert_int_equal(event.status, MBM_OK);
+        OK(event.status);
         assert_int_equal(event.unit, 17);
         assert_int_equal(event.function, 3);
         assert_int_equal(event.timeUs, 12345);

@@ -170,7 +170,7 @@ static void assert_all_reported(const modbus_mapping_t *mapping)
     assert_non_null(strstr(t[19].text, "16 mask write register  2: and FF00 or 0012"));
     assert_non_null(strstr(t[20].text, "read 40..41, write 50: 4660"));
     assert_non_null(strstr(t[21].text, "40..41: 4660 43981"));
-    assert_int_equal(t[23].event.status, MBM_ILLEGAL_DATA_ADDRESS);
+    IS(MBM_ILLEGAL_DATA_ADDRESS, t[23].event.status);
 }
 
 TEST(frames_of_libmodbus_on_a_serial_line_are_reported)

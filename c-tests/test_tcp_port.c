@@ -177,7 +177,7 @@ TEST(a_failed_open_sets_errno)
 {
     FAILS(ENXIO, mbm_tcp_open(&tcp, &addresses, "127.0.0.1", "no-such-service"));
     FAILS(EBADF, mbm_tcp_attach(&tcp, -1));
-    assert_int_equal(mbm_tcp_connect(&tcp), MBM_LINK_LOST);
+    IS(MBM_LINK_LOST, mbm_tcp_connect(&tcp));
     assert_int_equal(tcp.error, ENOTCONN);
     mbm_tcp_close(&tcp);
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);

@@ -58,7 +58,7 @@ static void read_all_words(void)
     memset(read_words, 0, sizeof read_words);
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, FIRST, WORDS));
     exchange();
-    assert_int_equal(request.status, MBM_OK);
+    OK(request.status);
     assert_memory_equal(read_words, words, sizeof words);
 }
 
