@@ -112,6 +112,8 @@ static void expect_words(const char *text, unsigned count, const uint16_t *words
 
 TEST(bits_of_a_register_are_written_if_the_device_writes_masks)
 {
+    read_text("mask_write: true\n" FIELD("    type: bit\n    access: write\n"));
+    device_free(&meter);
     read_text("mask_write: yes\nfields:\n"
               "  - {name: pump, table: holding, address: 7, type: bit, bit: 3, access: write}\n"
               "  - {name: mode, table: holding, address: 7, type: bit, bit: 4, count: 3,\n"
@@ -275,7 +277,11 @@ TEST(keys_that_do_not_go_together_are_refused)
         {"mask_write: no\n" FIELD("    type: bit\n    access: write\n"),
          "7: access is write: bits of a register cannot be written, unless the device has function "
          "22 and the file says \"mask_write: yes\""},
-        {"mask_write: true\n" UINT16(""), "1: mask_write: \"true\" is not one of no and yes"},
+        {"mask_write: 1\n" UINT16(""),
+         "1: mask_write: \"1\" is not one of no, yes, false and true"},
+        {"mask_write: false\n" FIELD("    type: bit\n    access: write\n"),
+         "7: access is write: bits of a register cannot be written, unless the device has function "
+         "22 and the file says \"mask_write: yes\""},
         {FIELD("    type: bit\n    bit: 1\n    scale: 2\n"), "7: a bit has no scale"},
         {"fields: [{name: a, table: coils, address: 0,\n type: uint16}]",
          "2: type is uint16: the type of coils and discrete inputs is bit"},

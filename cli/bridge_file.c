@@ -21,7 +21,7 @@ const char *const bridge_names[] = {
 
 enum { LINE, THE_FILE, LINE_TOPIC, LINE_REACH, LINE_KEYS = LINE_REACH + REACH_FILE_KEYS };
 static const char *const LINE_NAMES[] = {"line", "file", "topic", REACH_FILE_NAMES, NULL};
-static const char *const ANSWERS[] = {"no", "yes", NULL};
+static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 static const char *const DISCOVERIES[] = {"homeassistant", NULL};
 
 /* --- settings --- */
@@ -158,7 +158,7 @@ int bridge_setup_is(const bridge_setup *of, int setting)
 {
     const char *value = of->values[setting];
 
-    return value && strcmp(value, "no") != 0;
+    return value && strcmp(value, "no") != 0 && strcmp(value, "false") != 0;
 }
 
 /* --- lines --- */

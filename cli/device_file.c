@@ -93,9 +93,10 @@ static const char *const FIELD_NAMES[] = {"name",          "table",
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
-/* Words whose numbers are their places; those of access count from 1, like the words of value.h. */
+/* Words whose numbers are their places; those of access count from 1, like the words of value.h.
+ * The lowest bit of an answer says whether it is yes. */
 static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
-static const char *const ANSWERS[] = {"no", "yes", NULL};
+static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 
 /* --- a field --- */
 
@@ -509,7 +510,7 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
         !device_limits_read(file, values + LIMITS, into) ||
         !reach_read_nodes(file, values + REACH, &into->reach))
         return 0;
-    into->writes_masks = (uint8_t)writes_masks;
+    into->writes_masks = writes_masks & 1;
     shared.not_available = values[DEVICE_NOT_AVAILABLE];
     return read_fields(file, values[FIELDS], &shared, into) && device_names_make(file, into) &&
            sort_fields(file, into) && read_late(file, into);

@@ -117,6 +117,7 @@ static const char *type_of(import *j, tree *entity, const char *name)
 /* Sets type, count, order, scale and the like. Returns 0 if the field has no type here. */
 static int set_value(import *j, unsigned field, tree *entity, const char *scale, const char *offset)
 {
+    const char *precision = tree_text(entity, "precision", NULL);
     const char *name = import_name(j, field), *type = type_of(j, entity, name);
     const char *swap = tree_text(entity, "swap", "none"), *order = import_word(ORDERS, swap);
     const char *count = tree_text(entity, "count", NULL);
@@ -134,7 +135,8 @@ static int set_value(import *j, unsigned field, tree *entity, const char *scale,
         import_set(j, field, line_of(entity, "swap"), "order", "%s", order);
     copy_number(j, field, entity, scale, "scale", 1);
     copy_number(j, field, entity, offset, "offset", 0);
-    copy_key(j, field, entity, "precision", "precision");
+    if (precision)
+        import_set(j, field, line_of(entity, "precision"), "precision", "%s", precision);
     return 1;
 }
 

@@ -297,6 +297,8 @@ static void import_workarounds(import *j, tree *plugin)
         return;
     set_time(j, of, "pause_after_connect", "delay");
     set_time(j, of, "pause_between_requests", "message_wait");
+    set_time(j, of, "max_word_registers_per_request", "max_read_registers");
+    set_time(j, of, "max_bit_registers_per_request", "max_read_bits");
     if (strcmp(tree_text(of, "close_connection_after_gather", "false"), "true") == 0)
         import_set(j, IMPORT_HEAD, of->line, "close", "round");
     import_lose_rest(j, of, "workarounds");

@@ -15,7 +15,7 @@ const char *const reach_names[] = {REACH_NAMES, NULL};
 /* Words of a list: each has the number that its place says. */
 static const char *const ACCEPTS[] = {"unit", "transaction", NULL};
 static const char *const CLOSES[] = {"never", "round", "error", NULL};
-static const char *const ANSWERS[] = {"no", "yes", NULL};
+static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 
 /* --- values --- */
 
@@ -74,7 +74,7 @@ static const char *read_answer(const char *text, uint8_t *answer)
     int index = 0;
     const char *wrong = number_word(text, ANSWERS, &index);
 
-    *answer = (uint8_t)index;
+    *answer = index & 1;
     return wrong;
 }
 

@@ -3,6 +3,7 @@ test_device_keys.py plays each row against a server of libmodbus, one of pymodbu
 
 import dataclasses
 import json
+import time
 
 from peers import bit, tcp_frame, word
 from test_types import TYPES, is_text
@@ -28,6 +29,7 @@ class Row:
     units: set = dataclasses.field(default_factory=lambda: {17})
     manner: type = None  # what the device does with requests and replies: a class of its own for each connection to mbm
     rounds: int = 1
+    options: tuple = ("--timeout", "2s")
     statuses: set = dataclasses.field(default_factory=lambda: {"success"})
     check: object = None  # a further look at the device after the last round
 
@@ -68,6 +70,14 @@ class LosesTheFirst:
     def reply(self, transaction, unit, pdu):
         self.count += 1
         return tcp_frame(transaction, unit, pdu) if self.count > 1 else None
+
+
+class Late:
+    """Answers after the timeout that a file without the key has."""
+
+    def reply(self, transaction, unit, pdu):
+        time.sleep(1.5)
+        return tcp_frame(transaction, unit, pdu)
 
 
 class BusyFirst(LosesTheFirst):
@@ -233,6 +243,8 @@ ROWS = [
     modicon(101, 9, 31, 31, "one_based: yes\nunit: 17\n", ("table: holding, ", "table: input, ", "table: coils, ", "table: discrete, ")),
     Row("notation", file(field("a", 12, "type: uint16, value: 3, access: read-write"), head="notation: wire\nunit: 17\n"), {"a": 3}, {12: [3]},
         writes=[("a", "4", 6, 12, [4])], reads=[(3, 12, 1)]),
+    Row("timeout", file(field("a", 0, "type: uint16, value: 5, access: read-write"), head="unit: 17\ntimeout: 20s\n"), {"a": 5}, {0: [5]}, manner=Late, options=(),
+        writes=[("a", "9", 6, 0, [9])]),
     *(Row(keys, file(field("a", 0, "type: uint16, value: 5, access: read-write"), field("b", 200, "type: uint16, value: 6"), head=f"unit: 17\n{head}"),
           {"a": 5, "b": 6}, {0: [5], 200: [6]}, manner=manner, rounds=rounds, check=check, writes=[("a", "9", 6, 0, [9])])
       for keys, head, manner, rounds, check in (

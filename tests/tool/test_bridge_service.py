@@ -187,6 +187,16 @@ fields:
 """
 
 
+@pytest.mark.parametrize("word, payload", [("yes", "1"), ("true", "1"), ("no", None), ("false", None)])
+def test_a_file_says_yes_or_true_and_no_or_false(mbm, broker, begin, write, word, payload):
+    model, meter = Model(1, 2), write("meter.yaml", FIELDS % ("meter", 1))
+    begin(write("bridge.yaml", f"plain: {word}\nlines: [{{line: '{model.line}', file: {meter}}}]\n"))
+    subscriber = subscribed(broker)
+    assert wait(lambda: any(topic.endswith("/level") for topic in subscriber.last))
+    last = next(text for topic, text in subscriber.last.items() if topic.endswith("/level"))
+    assert last == payload if payload else json.loads(last)["value"] == 1
+
+
 def test_each_pair_on_the_command_line_has_a_topic(mbm, broker, begin, write):
     one, two = Model(1, 2), Model(3, 4)
     meter, pump = write("meter.yaml", FIELDS % ("meter", 1)), write("pump.yaml", FIELDS % ("pump", 1))
@@ -219,7 +229,7 @@ def test_each_pair_on_the_command_line_has_a_topic(mbm, broker, begin, write):
     ("keep_alive: 1s\nlines: []\n", ":1: keep_alive: \"1s\" is out of range"),
     ("discovery: other\nlines: []\n", ':1: discovery: "other" is not one of homeassistant'),
     ("discovery_prefix: ha\nlines: []\n", ":1: a prefix of discovery needs discovery"),
-    ("plain: true\nlines: []\n", ':1: plain: "true" is not one of no and yes'),
+    ("plain: 1\nlines: []\n", ':1: plain: "1" is not one of no, yes, false and true'),
     ("gap: 124\nlines: []\n", "from 0 to 123 is allowed"),
     ("gap: 010\nlines: []\n", ':1: gap: "010" begins with 0: write a decimal number'),
     ("cert: a\nlines: []\n", "cert and key need ca"),

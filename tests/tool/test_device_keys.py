@@ -11,8 +11,6 @@ from device_rows import NOT_ON_THE_WIRE, ROWS
 from peers import DONE, WRONG, Client, TcpDevice, pymodbus, tcp_frame
 from services import Broker, Subscriber
 
-PATIENT = ("--timeout", "2s")
-
 
 class Device(TcpDevice):
     """Stands before a server: notes requests and their times, and answers with the manner of a row. `unit` is that of the server,
@@ -100,7 +98,7 @@ def test_a_key_is_read(mbm, write, port, row):
         assert device.get(address, len(values)) == values
     for address, values in row.coils.items():
         assert device.get(address, len(values), is_coils=True) == values
-    found = mbm("poll", device.line, path, "--rounds", row.rounds, "--json", "-q", *PATIENT)
+    found = mbm("poll", device.line, path, "--rounds", row.rounds, "--json", "-q", *row.options)
     assert found.code == DONE, found
     rows = [json.loads(line) for line in found.out.splitlines()]
     assert {one["name"]: one["value"] for one in rows} == row.values
@@ -117,7 +115,7 @@ def test_a_key_is_written(plain, write, port, broker, row):
     path = write("device.yaml", row.text)
     device = begin(port, row, plain, path)
     topic = f"row{ROWS.index(row)}"
-    plain.begin("bridge", "-b", broker.place, "-t", topic, "-q", *PATIENT, device.line, path)
+    plain.begin("bridge", "-b", broker.place, "-t", topic, "-q", *row.options, device.line, path)
     subscriber = Subscriber(broker)
     # It has subscribed to the topics of writes by then.
     subscriber.expect_last(f"{topic}/status", "online")

@@ -215,8 +215,10 @@ def test_pauses_repetitions_and_the_end_of_connections_are_taken_over(imported, 
     pause_after_connect = "200ms"
     pause_between_requests = "0ms"
     close_connection_after_gather = true
+    max_word_registers_per_request = 60
+    max_bit_registers_per_request = 0
 """.replace("  [inputs", '  busy_retries = 3\n  busy_retries_wait = "50ms"\n  [inputs'))
-    assert said == "" and head_of(file).endswith("interval: 10s\nbusy_retries: 3\nbusy_wait: 50ms\ndelay: 200ms\nclose: round\n")
+    assert said == "" and head_of(file).endswith("interval: 10s\nbusy_retries: 3\nbusy_wait: 50ms\ndelay: 200ms\nmax_read_registers: 60\nclose: round\n")
     assert polled(file)["motor"] == bool(bit(0))
 
 

@@ -131,6 +131,8 @@ def test_more_data_than_asked_are_taken_if_asked(mbm, write, generous):
     assert mbm("read", lenient, 7).out == "    7  7\n"
     assert mbm("call", lenient, "03 00 05 00 01").out.startswith("03 02 00 05\n")
     assert mbm("poll", generous.line, write("d.yaml", "lenient: yes\n" + FIELDS), "--once").code == DONE
+    assert mbm("poll", generous.line, write("d.yaml", "lenient: true\n" + FIELDS), "--once").code == DONE
+    assert mbm("poll", generous.line, write("d.yaml", "lenient: false\n" + FIELDS), "--once").code == DAMAGED
     listen = mbm.begin("gateway", "tcp://127.0.0.1:0", lenient, "1-20").last_word()
     assert Client(listen).ask(9, bytes([3, 0, 5, 0, 1])) == number(5)
 
@@ -372,7 +374,7 @@ def test_a_device_with_unit_0_is_served_over_tcp(mbm, write):
     ("accept: everything", 'accept: "everything" is not one of unit and transaction'),
     ("accept: [unit, unit]", 'accept: "unit" is there twice'),
     ("accept: []", "accept"),
-    ("lenient: maybe", 'lenient: "maybe" is not one of no and yes'),
+    ("lenient: maybe", 'lenient: "maybe" is not one of no, yes, false and true'),
     ("delay: 70s", "delay"),
     ("delay: 5", "delay"),
     ("message_wait: 30", "message_wait"),
