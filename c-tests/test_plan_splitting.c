@@ -72,6 +72,32 @@ TEST(a_register_that_the_device_lacks_is_found_and_the_others_are_read_together)
     expect_found();
 }
 
+TEST(a_register_that_is_missing_between_two_fields_leaves_two_reads)
+{
+    add_registers(16);
+    for (uint16_t i = 11; i < 16; i++)
+        d.fields[i].address++;
+    d.setup.registerGap = 1;
+    d.splitting.retryMs = 15 * SECOND;
+    d.lacks[11] = 1;
+    plan_device_start(&d);
+    assert_int_equal(reads(), 1);
+    plan_device_run(&d, 900);
+    expect_found();
+    assert_int_equal(reads(), 2);
+    const unsigned before = d.requested;
+    plan_device_run(&d, 10 * SECOND);
+    assert_int_equal(d.requested - before, 20);
+    expect_found();
+    /* What could not be joined is tried once more, in vain and then with success. */
+    plan_device_run(&d, 10 * SECOND);
+    assert_int_equal(reads(), 2);
+    d.lacks[11] = 0;
+    plan_device_run(&d, 10 * SECOND);
+    assert_int_equal(reads(), 1);
+    expect_found();
+}
+
 TEST(only_the_field_that_is_not_there_is_told_of_an_exception)
 {
     add_registers(16);
