@@ -190,9 +190,9 @@ unsafe fn begin(
     Ok(())
 }
 
-/// A copy of the description of frames, if it is valid.
-unsafe fn described(framing: In<mbm_framing>) -> Result<(mbm_framing, Framing), Error> {
-    let described = framing.get()?;
+/// The description of frames, if it is valid.
+unsafe fn described<'a>(framing: In<mbm_framing>) -> Result<(&'a mbm_framing, Framing), Error> {
+    let described = framing.value().ok_or(Error::InvalidArgument)?;
     declared(described.functions()?, None)?;
     if !is_delimiter(described.end()) {
         return Err(Error::InvalidArgument);
