@@ -1,58 +1,16 @@
 /* Peers that never stop sending: every request ends, and every poll too, whatever arrives. */
 #include "linked.h"
+#include "talker.h"
 
 enum { STEPS = 20000 };
 
-/* What the peer sends: these bytes again and again, in pieces. */
-static struct {
-    const uint8_t *bytes;
-    size_t count, at;
-    size_t piece;        /* bytes of a read at most */
-    size_t each;         /* bytes of each connection, which is lost then; 0: no end */
-    size_t left;         /* of these */
-    unsigned reads;      /* since the last poll began */
-    unsigned most_reads; /* of a poll */
-} peer;
-
-static int16_t read_peer(void *context, uint8_t *bytes, uint16_t capacity)
-{
-    size_t count = peer.piece < capacity ? peer.piece : capacity, i;
-
-    assert_ptr_equal(context, &m);
-    peer.reads++;
-    if (m.is_lost)
-        return -1;
-    if (peer.each > 0) {
-        if (peer.left == 0) {
-            m.is_lost = 1;
-            return -1;
-        }
-        count = count < peer.left ? count : peer.left;
-        peer.left -= count;
-    }
-    for (i = 0; i < count; i++, peer.at++)
-        bytes[i] = peer.bytes[peer.at % peer.count];
-    return (int16_t)count;
-}
-
-static int16_t write_peer(void *context, const uint8_t *bytes, uint16_t length)
-{
-    (void)bytes;
-    assert_ptr_equal(context, &m);
-    m.sent_count += length;
-    return m.is_lost ? -1 : (int16_t)length;
-}
-
-static uint32_t micros_peer(void *context)
-{
-    return ((memory_port *)context)->now;
-}
+static talker peer;
 
 static uint8_t connect_peer(void *context)
 {
     assert_ptr_equal(context, &m);
     connects++;
-    m.is_lost = 0;
+    peer.is_lost = 0;
     peer.left = peer.each;
     return MBM_OK;
 }
@@ -60,10 +18,10 @@ static uint8_t connect_peer(void *context)
 static const mbm_linkHooks peer_hooks = {
     .context = &m, .disconnect = disconnect, .connect = connect_peer};
 
-static void begin_peer(int framing, int has_link)
+/* A client, with a link or without, of a peer that says these bytes. */
+static void begin_peer(int framing, int has_link, const uint8_t *bytes, size_t count, size_t piece)
 {
-    const mbm_port port = {
-        .context = &m, .read = read_peer, .write = write_peer, .micros = micros_peer};
+    const mbm_port port = talker_begin(&peer, bytes, count, piece, &m.now);
 
     begin(framing);
     memset(&client, 0, sizeof client);
@@ -87,24 +45,14 @@ static unsigned until_end(const mbm_clientRequest *which)
     unsigned steps = 0;
 
     while (which->status == MBM_PENDING && steps < STEPS) {
-        peer.reads = 0;
+        talker_poll_begins(&peer);
         (void)mbm_client_poll(&client);
-        if (peer.reads > peer.most_reads)
-            peer.most_reads = peer.reads;
+        talker_poll_ends(&peer);
         steps++;
         m.now += MS;
     }
     assert_true(steps < STEPS);
     return steps;
-}
-
-static void send_always(const uint8_t *bytes, size_t count, size_t piece, size_t each)
-{
-    memset(&peer, 0, sizeof peer);
-    peer.bytes = bytes;
-    peer.count = count;
-    peer.piece = piece;
-    peer.each = each;
 }
 
 /* --- connections that are closed again --- */
@@ -116,8 +64,8 @@ static const char in_use[] = "Port already in use\r\n";
 
 static void begin_in_use(int framing)
 {
-    send_always((const uint8_t *)in_use, sizeof in_use - 1, 100, sizeof in_use - 1);
-    begin_peer(framing, 1);
+    begin_peer(framing, 1, (const uint8_t *)in_use, sizeof in_use - 1, 100);
+    peer.each = sizeof in_use - 1;
 }
 
 TEST(a_peer_that_sends_a_text_and_closes_each_connection_fails_the_request)
@@ -135,7 +83,7 @@ TEST(a_peer_that_sends_a_text_and_closes_each_connection_fails_the_request)
         /* The attempts after that have their waits. */
         run(5000);
         assert_in_range(connects, 2, 20);
-        assert_int_equal(m.sent_count, 0);
+        assert_int_equal(peer.sent, 0);
     }
 }
 
@@ -153,7 +101,9 @@ TEST(a_peer_that_closes_each_connection_during_the_delay_after_it_fails_the_requ
         peer.piece = 0;
         run(4000);
         queue_read(&request);
-        memory_port_send(&m, &client);
+        assert_in_range(until_end(&request), 250, 400);
+        IS(MBM_RESPONSE_TIMED_OUT, request.status);
+        assert_true(peer.sent > 0);
     }
 }
 
@@ -172,38 +122,12 @@ TEST(requests_that_wait_for_the_link_make_no_loop_of_connections_that_are_closed
 
 /* --- bytes that keep coming --- */
 
-#define BYTES(text) (const uint8_t *)(text), sizeof(text) - 1
-
-typedef struct talk {
-    const char *what;
-    const uint8_t *bytes;
-    size_t count;
-} talk;
-
-static const talk TALKS[] = {
-    {"zeros", BYTES("\0")},
-    {"a text", BYTES("Port already in use\r\n")},
-    {"beginnings of ASCII frames", BYTES(":")},
-    {"an ASCII reply", BYTES(":0703021234AE\r\n")},
-    {"half an ASCII reply", BYTES(":0703021234\r\n")},
-    {"an RTU reply", BYTES("\x07\x03\x02\x12\x34\x3D\x33")},
-    {"another unit's RTU reply", BYTES("\x05\x03\x02\x12\x34\x44\xF3")},
-    {"half an RTU reply", BYTES("\x07\x03\x02\x12")},
-    {"a damaged RTU reply", BYTES("\x07\x03\x02\x12\x34\xFF\xFF")},
-    {"the number of another request", BYTES("\x7F\xFF\0\0\0\5\7\3\2\x12\x34")},
-    {"another unit with the right number", BYTES("\0\0\0\0\0\5\5\3\2\x12\x34")},
-    {"half a frame of TCP", BYTES("\0\0\0\0\0\xFE\7")},
-    {"headers that announce more than a frame", BYTES("\0\0\0\0\xFF\xFF\7")},
-    {"frames of TCP without a PDU", BYTES("\0\0\0\0\0\1\7")},
-};
-
 /* What the reads of a poll may take: those of a deadline are 255 for each request. */
 enum { MOST_READS = 600, MOST_MS = 3000 };
 
 static void request_ends(const talk *t, int framing, int has_link, size_t piece)
 {
-    send_always(t->bytes, t->count, piece, 0);
-    begin_peer(framing, has_link);
+    begin_peer(framing, has_link, t->bytes, t->count, piece);
     for (unsigned round = 0; round < 4; round++) {
         queue_read(&request);
         if (until_end(&request) > MOST_MS || peer.most_reads > MOST_READS)
@@ -254,8 +178,7 @@ TEST(a_request_ends_with_every_setting_that_waits)
                 if (framings[f] != MBM_FRAMING_TCP &&
                     (w < FIRST_FOR_ALL || (w == 3 && framings[f] == MBM_FRAMING_ASCII)))
                     continue;
-                send_always(TALKS[i].bytes, TALKS[i].count, 7, 0);
-                begin_peer(framings[f], is_of_link(w));
+                begin_peer(framings[f], is_of_link(w), TALKS[i].bytes, TALKS[i].count, 7);
                 set_wait(w);
                 for (unsigned round = 0; round < 4; round++) {
                     queue_read(&request);
@@ -270,11 +193,12 @@ TEST(a_request_after_a_cancelled_one_ends)
 {
     for (unsigned i = 0; i < COUNT(TALKS); i++)
         for (unsigned f = 0; f < COUNT(framings); f++) {
-            send_always(TALKS[i].bytes, TALKS[i].count, 7, 0);
-            peer.piece = 0;
-            begin_peer(framings[f], 0);
+            begin_peer(framings[f], 0, TALKS[i].bytes, TALKS[i].count, 0);
             queue_read(&request);
-            memory_port_send(&m, &client);
+            while (peer.sent == 0 && m.now < STEPS * MS) {
+                (void)mbm_client_poll(&client);
+                m.now += MS;
+            }
             for (unsigned step = 0; step < 20; step++, m.now += MS)
                 (void)mbm_client_poll(&client);
             OK(mbm_client_cancel(&client, &request));
@@ -289,8 +213,7 @@ TEST(a_poll_of_an_idle_link_ends)
 {
     for (unsigned i = 0; i < COUNT(TALKS); i++)
         for (unsigned f = 0; f < COUNT(framings); f++) {
-            send_always(TALKS[i].bytes, TALKS[i].count, 1, 0);
-            begin_peer(framings[f], 1);
+            begin_peer(framings[f], 1, TALKS[i].bytes, TALKS[i].count, 1);
             for (unsigned step = 0; step < 100; step++, m.now += MS) {
                 peer.reads = 0;
                 (void)mbm_client_poll(&client);
