@@ -221,3 +221,31 @@ TEST(a_poll_of_an_idle_link_ends)
             }
         }
 }
+
+/* --- a master, which waits in its call --- */
+
+TEST(a_blocking_call_ends_whatever_arrives_without_a_pause)
+{
+    static mbm_line line;
+    static mbm_node node;
+
+    for (unsigned i = 0; i < COUNT(TALKS); i++)
+        for (size_t piece = 1; piece <= 100; piece *= 10) {
+            const mbm_port port =
+                talker_begin(&peer, TALKS[i].bytes, TALKS[i].count, piece, &m.now);
+
+            memset(&line, 0, sizeof line);
+            memset(&node, 0, sizeof node);
+            peer.step = 100;
+            OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
+            OK(mbm_node_begin(&node, &line, UNIT, words, COUNT(words), NULL, 0));
+            OK(mbm_node_setResponseTimeout(&node, 300));
+            for (unsigned round = 0; round < 4; round++) {
+                const uint32_t before = m.now;
+
+                (void)mbm_node_readHoldingRegisters(&node, 0, 1);
+                if (m.now - before > MOST_MS * MS)
+                    fail_msg("%s, %zu bytes a read", TALKS[i].what, piece);
+            }
+        }
+}
