@@ -217,8 +217,9 @@ uint8_t mbm_link_state(const mbm_link *link);
  * and waits for that. Such a close is no loss: the link counts none and reports none.
  *
  * MBM_LINK_CLOSE_WHEN_IDLE is for devices with few places for connections. A program that
- * queues the requests of a round before it polls, as mbm_plan_poll does, closes the link after
- * each round.
+ * queues the requests of a round before it polls closes the link after each round. A plan does
+ * so in its first round; later it spreads the requests, and the link is closed after each that
+ * none follows at once.
  *
  * MBM_LINK_CLOSE_AFTER_FAILURE is for devices that answer no more, or wrongly, until they are
  * connected to anew: after a request, or its repetition, whose response is missing, damaged or
