@@ -94,19 +94,21 @@ HEADER = tool=$$(CARGO="$(CARGO)" scripts/cargo-tool cbindgen 0.29.4) && scripts
 header: ## Generate include/mbm.h and its parts from the source
 	@$(HEADER)
 
-# The features of the core that add a crate.
+# The features of the core that firmware may have.
 FEATURES := defmt,embedded-io,embedded-io-async
-# The others need another target, or compile C first.
-LINTED := --workspace --exclude mbm-example --exclude mbm-bench
+# The others need another target, or compile C first, or the standard library, with which the archive
+# does not compile.
+LINTED := --workspace --exclude mbm-example --exclude mbm-bench --exclude mbm-host-example
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, spelling, symbols
 	@$(CARGO) fmt --all --check
 	@$(CARGO) clippy --quiet $(LINTED) --all-targets --features pymodbus,$(FEATURES) -- -D warnings
 	@$(CARGO) clippy --quiet $(LINTED) --all-targets -- -D warnings
-	@for feature in $(subst $(comma), ,$(FEATURES)); do \
+	@$(CARGO) clippy --quiet -p mbm -p mbm-host-example --all-targets --features pymodbus,std,$(FEATURES) -- -D warnings
+	@for feature in std $(subst $(comma), ,$(FEATURES)); do \
 		$(CARGO) clippy --quiet --features $$feature -- -D warnings || exit 1; done
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
-	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features $(FEATURES)
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features std,$(FEATURES)
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles

@@ -2,40 +2,100 @@
 //! sniffer and a trace, on serial lines (RTU and ASCII) and on TCP. The crate does not use a
 //! heap and never panics.
 //!
-//! # A master
+//! # Read two registers
 //!
-//! [`master::Master`] sends one request at a time on an RTU line. This example reads two
-//! registers of unit 17:
+//! Over TCP, with the feature `std`:
 //!
+#![cfg_attr(feature = "std", doc = "```no_run")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+//! use mbm::client::BlockingClient;
+//! use mbm::port::StdIo;
+//!
+//! let mut client = BlockingClient::tcp(StdIo::connect("192.168.1.10:502")?);
+//! // Registers 107 and 108 of unit 17.
+//! let [flow, total] = client.holding_registers(17, 107)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
+//!
+//! On a serial line of firmware, with the feature `embedded-io`. `uart` is that of a HAL, `micros` a
+//! clock in microseconds:
+//!
+#![cfg_attr(feature = "embedded-io", doc = "```")]
+#![cfg_attr(not(feature = "embedded-io"), doc = "```ignore")]
+//! use embedded_io::{Read, ReadReady, Write, WriteReady};
 //! use mbm::master::{Buffers, Master};
+//! use mbm::port::EmbeddedIo;
 //!
-//! # fn main() -> Result<(), mbm::Error> {
-//! # let uart = uart();
+//! # fn read(
+//! #     uart: impl Read + ReadReady + Write + WriteReady,
+//! #     micros: fn() -> u32,
+//! # ) -> Result<[u16; 2], mbm::Error> {
 //! // The frame buffer, the words that a read fills, the words that a write sends.
-//! let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
-//! let mut master = Master::new(17, uart, buffers);
-//! master.settings().set_baud_rate(9600);
-//!
-//! assert_eq!(master.holding_registers(107)?, [555, 100]);
-//!
-//! // Without waiting:
-//! master.start_read_holding_registers(107, 2)?;
-//! while master.poll().is_pending() { /* The firmware does its other work here. */ }
-//! assert_eq!(master.response(), [555, 100]);
-//! # Ok(())
+//! let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
+//! let mut master = Master::new(17, EmbeddedIo::serial(uart, micros), buffers);
+//! master.settings().set_baud_rate(19200);
+//! let [flow, total] = master.holding_registers(107)?;
+//! # Ok([flow, total])
 //! # }
 //! ```
 //!
-//! [`master::Master::poll`] does not wait: a main loop calls it until it returns `Poll::Ready` with the
-//! result of the request.
-//! Functions return `Result` with [`Error`].
+//! On a serial line, as a future, with the feature `embedded-io-async`. `uart` is a UART of
+//! embedded-io-async, `Delay` is `DelayNs` of embedded-hal-async, which every executor's timer has:
+//!
+#![cfg_attr(feature = "embedded-io-async", doc = "```")]
+#![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+//! use mbm::master::{AsyncMaster, Buffers};
+//!
+//! async fn read() -> Result<[u16; 2], mbm::Error> {
+//!     let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
+//!     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
+//!     master.settings().set_baud_rate(19200);
+//!     master.holding_registers(107).await
+//! }
+//! # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+//! ```
+//!
+//! # Serve four registers
+//!
+//! Over TCP, with the feature `std`. On a serial line it is `Server::rtu(port)`:
+//!
+#![cfg_attr(feature = "std", doc = "```no_run")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+//! use mbm::port::StdIo;
+//! use mbm::server::{Server, Tables, Unit};
+//! use std::net::TcpListener;
+//!
+//! // Registers 107 to 110 of unit 17.
+//! let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
+//! let listener = TcpListener::bind("0.0.0.0:502")?;
+//! loop {
+//!     let connection = StdIo::accepted(listener.accept()?.0)?;
+//!     Server::tcp(connection).run(&mut unit);
+//! }
+//! # Ok::<(), std::io::Error>(())
+//! ```
+//!
+//! # Which type
+//!
+//! | you want | type |
+//! |---|---|
+//! | every function, on RTU, ASCII, TCP or RTU over TCP, in calls that wait | [`client::BlockingClient`] |
+//! | the same without waiting: many requests, queued, repeated, several in flight | [`client::Client`] with [`client::Request`] |
+//! | one RTU line in little memory, in calls that wait or with `poll` | [`master::Master`] |
+//! | the same with futures | `master::AsyncMaster` |
+//! | a server of your values | [`server::Server`] with a [`server::Device`] of yours, or with [`server::Tables`] |
+//! | values read at intervals | [`plan`] |
+//! | a gateway from TCP to lines | [`gateway`] |
+//! | the traffic of others | [`sniffer`], [`trace`] |
+//!
+//! Functions return `Result` with [`Error`], an enum. A server refuses a request with an
+//! [`Exception`].
 //!
 //! # A port
 //!
-//! `uart` is a [`port::Port`], which your firmware implements for its UART or socket. Its clock is
-//! in microseconds and may wrap:
+//! A [`port::Port`] is the way to a UART or socket, and has a clock in microseconds, which may wrap.
+//! `port::StdIo` and `port::EmbeddedIo` are ports. For other hardware, implement the trait:
 //!
 //! ```
 //! use mbm::port::Port;
@@ -56,34 +116,21 @@
 //! }
 //! ```
 //!
-//! With the feature `embedded-io`, `port::EmbeddedIo` is such a port over the UART of a HAL.
-//! `docs/guide-rust.md` has one for `std::net::TcpStream`. The examples here use a `Uart` with a
-//! simulated device on its line.
+//! # Without waiting
 //!
-//! # Futures
+//! A main loop that has other work starts a request, and polls:
 //!
-//! With the feature `embedded-io-async`, `master::AsyncMaster` has the same functions as futures.
-//! `uart` is a UART of embedded-io-async, `micros` a clock, and `Delay` is `DelayNs` of
-//! embedded-hal-async, which every executor's timer has:
-//!
-#![cfg_attr(feature = "embedded-io-async", doc = "```")]
-#![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
-//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
-//! use mbm::master::{AsyncMaster, Buffers};
-//!
-//! async fn read() -> Result<[u16; 2], mbm::Error> {
-//!     let buffers = Buffers::new([0; 32], [0; 10], [0; 10]);
-//!     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
-//!     master.settings().set_baud_rate(9600);
-//!
-//!     let mut words = [0; 2];
-//!     master.read_holding_registers(107, &mut words).await?;
-//!     Ok(words)
-//! }
-//! # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
 //! ```
-//!
-//! # A client
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
+//! # use mbm::master::{Buffers, Master};
+//! # fn main() -> Result<(), mbm::Error> {
+//! # let mut master = Master::new(17, uart(), Buffers::new([0; 256], [0; 125], [0; 123]));
+//! master.start_read_holding_registers(107, 2)?;
+//! while master.poll().is_pending() { /* The firmware does its other work here. */ }
+//! assert_eq!(master.response(), [555, 100]);
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! [`client::Client`] queues requests of every function, and retries them as its policy says.
 //! On TCP it may have many requests in flight at the same time. [`client::Request`] is a request with
@@ -113,38 +160,25 @@
 //! # }
 //! ```
 //!
-//! # A server
-//!
-//! [`server::Server`] finds requests on a line or connection. Each unit has a list of
-//! services, which answer them:
+//! [`server::Server::serve`] does what there is to do, and returns:
 //!
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/uart.rs"));
-//! use mbm::frame::Framing;
-//! use mbm::server::storage::{HoldingRegisters, RegisterArray};
-//! use mbm::server::{Server, ServiceUnit};
+//! use mbm::server::{Server, Tables, Unit};
 //!
 //! # fn main() -> Result<(), mbm::Error> {
-//! let mut words = [555, 100, 0];
-//! # {
 //! # let arriving = &[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
 //! # let uart = Uart { sends: &[], now: 0, arriving, sent: 0 };
-//! let mut server = Server::with_framing(Framing::Rtu, uart, [0; 256]);
+//! let mut server = Server::rtu(uart);
 //! server.set_baud_rate(9600);
-//! let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
-//! let mut units = [ServiceUnit {
-//!     id: 17,
-//!     services: &mut [&mut registers],
-//!     diagnostics: None,
-//! }];
+//! let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
 //!
 //! # for now in (0..100_000).step_by(100) {
 //! // In the main loop, with the time of the clock:
-//! server.serve(now, &mut units[..])?;
-//! # }
+//! server.serve(now, &mut unit)?;
 //! # }
 //! // A master wrote 888 to register 109.
-//! assert_eq!(words, [555, 100, 888]);
+//! assert_eq!(unit.device.holding_registers.cells, [555, 100, 888, 0]);
 //! # Ok(())
 //! # }
 //! ```
@@ -176,8 +210,9 @@
 //! they work. [`data`] has numbers and texts of several registers, [`ring`] is a receive buffer that
 //! an interrupt fills.
 //!
-//! No module allocates memory, has global variables or panics, and none waits but
-//! [`master::Master::wait`]. The C ABI is the crate `mbm-c`.
+//! No module allocates memory, has global variables or panics. The calls that wait are those of
+//! [`client::BlockingClient`] and [`master::Master`], and [`server::Server::run`]; nothing else does. The
+//! C ABI is the crate `mbm-c`.
 //!
 //! # Features
 //!
@@ -185,7 +220,8 @@
 //! |---|---|
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
 //! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async |
-//! | `defmt` | `defmt::Format` for [`Status`] and [`Error`] |
+//! | `std` | `port::StdIo`, a port over a socket or serial port of the standard library |
+//! | `defmt` | `defmt::Format` for [`Status`], [`Error`] and [`Exception`] |
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -195,7 +231,7 @@
 // docs.rs shows which feature an item needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 /// The atomic types of the ring. `tests/ring_orders.rs` compiles `ring.rs` with loom's types of
@@ -228,7 +264,12 @@ pub mod trace;
 pub mod engine;
 
 // The examples of the guide are tests.
-#[cfg(all(doctest, feature = "embedded-io", feature = "embedded-io-async"))]
+#[cfg(all(
+    doctest,
+    feature = "embedded-io",
+    feature = "embedded-io-async",
+    feature = "std"
+))]
 #[doc = include_str!("../docs/guide-rust.md")]
 #[doc = include_str!("../docs/values.md")]
 #[doc = include_str!("../README.md")]

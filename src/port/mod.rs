@@ -2,9 +2,13 @@
 
 #[cfg(feature = "embedded-io")]
 mod embedded_io;
+#[cfg(feature = "std")]
+mod std_io;
 
 #[cfg(feature = "embedded-io")]
 pub use self::embedded_io::EmbeddedIo;
+#[cfg(feature = "std")]
+pub use self::std_io::StdIo;
 
 use crate::error::Error;
 

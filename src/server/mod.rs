@@ -22,6 +22,8 @@ mod indication;
 mod line;
 mod reply;
 mod serve_device;
+#[cfg(feature = "std")]
+mod shared;
 pub mod storage;
 pub mod table;
 mod tables;

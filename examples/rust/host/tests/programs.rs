@@ -1,0 +1,153 @@
+//! The programs against servers of pymodbus and libmodbus, and clients of pymodbus.
+#![cfg(feature = "pymodbus")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../..");
+
+/// A peer, which ends with its input.
+struct Peer {
+    child: Child,
+    line: String,
+}
+
+impl Peer {
+    /// Starts a program, which prints a line when it is ready.
+    fn start(program: &str, arguments: &[&str]) -> Peer {
+        let mut command = Command::new(program);
+        command.args(arguments).current_dir(ROOT);
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| {
+                panic!("{program}: {error}; run `make venv build/plain/serve_libmodbus`")
+            });
+        let mut line = String::new();
+        let output = child.stdout.take().expect("the output");
+        BufReader::new(output).read_line(&mut line).expect("a line");
+        Peer {
+            child,
+            line: line.trim_end().into(),
+        }
+    }
+
+    fn python(arguments: &[&str]) -> Peer {
+        Peer::start(&format!("{ROOT}/build/venv/bin/python"), arguments)
+    }
+
+    /// A server of pymodbus.
+    fn pymodbus(framing: &str, place: [&str; 2]) -> Peer {
+        let script = "tests/peer/pymodbus_server.py";
+        Peer::python(&[
+            "-B",
+            script,
+            "--framing",
+            framing,
+            place[0],
+            place[1],
+            "--baud",
+            "19200",
+        ])
+    }
+
+    /// The words of the line after the first.
+    fn words(&self) -> Vec<&str> {
+        self.line.split(' ').collect()
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        drop(self.child.stdin.take());
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What a program prints.
+fn run(program: &str, argument: &str) -> String {
+    let output = Command::new(program)
+        .arg(argument)
+        .output()
+        .expect("the program runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{program} {argument}: {error}");
+    String::from_utf8(output.stdout)
+        .expect("a text")
+        .trim_end()
+        .to_owned()
+}
+
+/// The registers 107 and 108 of the servers.
+fn expected() -> String {
+    let pattern = |address: u16| address.wrapping_mul(40503).wrapping_add(0x1234);
+    format!("{} {}", pattern(107), pattern(108))
+}
+
+#[test]
+fn two_registers_of_a_pymodbus_server_are_read_over_tcp_and_by_rtu_frames_in_tcp() {
+    for (program, framing) in [
+        (env!("CARGO_BIN_EXE_read_tcp"), "tcp"),
+        (env!("CARGO_BIN_EXE_read_rtu_over_tcp"), "rtu-over-tcp"),
+    ] {
+        let server = Peer::pymodbus(framing, ["--port", "0"]);
+        let address = format!("127.0.0.1:{}", server.words()[1]);
+        assert_eq!(run(program, &address), expected());
+    }
+}
+
+#[test]
+fn two_registers_of_a_pymodbus_server_are_read_on_serial_lines() {
+    for (program, framing) in [
+        (env!("CARGO_BIN_EXE_read_rtu"), "rtu"),
+        (env!("CARGO_BIN_EXE_read_ascii"), "ascii"),
+    ] {
+        let line = Peer::python(&[
+            "-B",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pty_pair.py"),
+        ]);
+        let ends = line.words();
+        let _server = Peer::pymodbus(framing, ["--tty", ends[0]]);
+        assert_eq!(run(program, ends[1]), expected());
+    }
+}
+
+#[test]
+fn two_registers_of_a_libmodbus_server_are_read_over_tcp_and_on_a_serial_line() {
+    let server = Peer::start(&format!("{ROOT}/build/plain/serve_libmodbus"), &[]);
+    let words = server.words();
+    assert_eq!(run(env!("CARGO_BIN_EXE_read_rtu"), words[1]), expected());
+    let address = format!("127.0.0.1:{}", words[2]);
+    assert_eq!(run(env!("CARGO_BIN_EXE_read_tcp"), &address), expected());
+}
+
+#[test]
+fn a_pymodbus_client_reads_and_writes_the_registers_of_the_server_on_two_connections() {
+    let server = Peer::start(env!("CARGO_BIN_EXE_serve_tcp"), &["127.0.0.1:0"]);
+    let port = server.line.rsplit(':').next().expect("a port").to_owned();
+    let script = "\
+import sys
+from pymodbus.client import ModbusTcpClient
+one, two = (ModbusTcpClient('127.0.0.1', port=int(sys.argv[1])) for _ in range(2))
+one.connect(), two.connect()
+read = lambda client, address, count: client.read_holding_registers(address, count=count, device_id=17)
+print(read(one, 107, 4).registers)
+one.write_registers(109, [888, 999], device_id=17)
+print(read(two, 108, 3).registers)
+print(read(two, 108, 4).exception_code)
+print(two.read_coils(0, count=1, device_id=17).exception_code)
+";
+    let python = format!("{ROOT}/build/venv/bin/python");
+    let output = Command::new(python)
+        .args(["-c", script, &port])
+        .output()
+        .expect("Python runs");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(
+        printed, "[555, 100, 0, 0]\n[100, 888, 999]\n2\n1\n",
+        "{error}"
+    );
+}
