@@ -26,8 +26,9 @@ DONE, SYSTEM, WRONG, LINE, NO_REPLY, EXCEPTION, DAMAGED = range(7)
 # A loaded machine must not let a test fail.
 PATIENCE = 60
 PATIENT = ("--timeout", "20s")
-# nohup ignores SIGHUP, and the programs that a test begins would inherit that.
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+# nohup ignores SIGHUP, and a shell SIGQUIT for what runs in the background. The programs that a test begins would inherit that.
+for one in (signal.SIGHUP, signal.SIGQUIT):
+    signal.signal(one, signal.SIG_DFL)
 endings = []
 
 
