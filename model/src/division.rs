@@ -205,6 +205,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_order_of_six_events_holds() {
+        let deadline = Instant::now() + Duration::from_secs(3600);
+        let orders = try_all(State::new(), 6, deadline, &mut Vec::new());
+        assert!(orders.is_ok_and(|orders| orders > 10_000));
+    }
+
+    #[test]
     fn the_model_finds_a_read_whose_end_is_forgotten() {
         let mut state = State::new();
         state.happen(Event::Turn(0));
