@@ -103,21 +103,19 @@ static uint8_t exchange_once(int framing, const exchange *e, const uint8_t *resp
     return memory_port_run(&m, &client, &request, 1000);
 }
 
-TEST(every_function_and_its_response_are_forwarded_unchanged)
+FRAMING_TEST(every_function_and_its_response_are_forwarded_unchanged)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned k = 0; k < COUNT(exchanges); k++) {
-            const exchange *e = &exchanges[k];
-            uint8_t exception[] = {(uint8_t)(e->request[0] | 0x80), 4};
+    for (unsigned k = 0; k < COUNT(exchanges); k++) {
+        const exchange *e = &exchanges[k];
+        uint8_t exception[] = {(uint8_t)(e->request[0] | 0x80), 4};
 
-            IS(MBM_OK,
-               exchange_once(framings[i], e, (const uint8_t *)e->response, e->response_bytes));
-            assert_int_equal(request.length, e->response_bytes - 1);
-            assert_memory_equal(reply, e->response + 1, request.length);
-            assert_int_equal(reply[request.length], 0xEE);
-            IS(4, exchange_once(framings[i], e, exception, sizeof exception));
-            assert_int_equal(request.exception, 4);
-        }
+        IS(MBM_OK, exchange_once(framing, e, (const uint8_t *)e->response, e->response_bytes));
+        assert_int_equal(request.length, e->response_bytes - 1);
+        assert_memory_equal(reply, e->response + 1, request.length);
+        assert_int_equal(reply[request.length], 0xEE);
+        IS(4, exchange_once(framing, e, exception, sizeof exception));
+        assert_int_equal(request.exception, 4);
+    }
 }
 
 /* The bytes of these responses are fixed by the request: each changed byte must be noticed. */
@@ -147,14 +145,12 @@ TEST(a_response_whose_repeated_bytes_differ_is_not_accepted)
             }
 }
 
-TEST(force_listen_only_mode_ends_without_a_response)
+FRAMING_TEST(force_listen_only_mode_ends_without_a_response)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        IS(MBM_PENDING, forward("\x08\x00\x04\x00\x00", 5));
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-        assert_int_equal(request.length, 0);
-    }
+    begin(framing);
+    IS(MBM_PENDING, forward("\x08\x00\x04\x00\x00", 5));
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_int_equal(request.length, 0);
 }
 
 TEST(a_request_that_is_not_forwarded_is_not_queued)
@@ -249,16 +245,15 @@ static void records_are_forwarded(int framing, uint8_t function, uint16_t length
     assert_true(record.record > 0);
 }
 
-TEST(records_are_forwarded_as_they_were_added)
+FRAMING_TEST(records_are_forwarded_as_they_were_added)
 {
     static const uint16_t lengths[] = {1, 2, 3, 7, 60, 122};
 
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned k = 0; k < COUNT(lengths); k++) {
-            if (lengths[k] <= 121)
-                records_are_forwarded(framings[i], MBM_FC_READ_FILE_RECORD, lengths[k]);
-            records_are_forwarded(framings[i], MBM_FC_WRITE_FILE_RECORD, lengths[k]);
-        }
+    for (unsigned k = 0; k < COUNT(lengths); k++) {
+        if (lengths[k] <= 121)
+            records_are_forwarded(framing, MBM_FC_READ_FILE_RECORD, lengths[k]);
+        records_are_forwarded(framing, MBM_FC_WRITE_FILE_RECORD, lengths[k]);
+    }
 }
 
 TEST(the_reply_to_records_that_were_added_is_accepted)

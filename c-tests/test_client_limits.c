@@ -23,7 +23,7 @@ static uint16_t words[4];
 static const uint8_t framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
                                    MBM_FRAMING_RTU_OVER_TCP};
 
-static void begin(unsigned framing)
+static void begin(int framing)
 {
     const mbm_port port = memory_port_of(&m);
 
@@ -61,92 +61,86 @@ static uint32_t time_of_read(void)
     return (m.now - sent) / MS;
 }
 
-TEST(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client)
+FRAMING_TEST(the_timeout_of_a_request_overrides_that_of_the_unit_and_of_the_client)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        assert_int_equal(time_of_read(), CLIENTS);
-        request.timeoutMs = OWN;
-        assert_int_equal(time_of_read(), OWN);
-        request.timeoutMs = 10;
-        assert_int_equal(time_of_read(), 10);
-        request.timeoutMs = UINT16_MAX;
-        assert_int_equal(time_of_read(), UINT16_MAX);
+    begin(framing);
+    assert_int_equal(time_of_read(), CLIENTS);
+    request.timeoutMs = OWN;
+    assert_int_equal(time_of_read(), OWN);
+    request.timeoutMs = 10;
+    assert_int_equal(time_of_read(), 10);
+    request.timeoutMs = UINT16_MAX;
+    assert_int_equal(time_of_read(), UINT16_MAX);
 
-        units[1].timeoutMs = UNITS;
-        OK(mbm_client_setUnits(&client, units, 2));
-        assert_int_equal(time_of_read(), UINT16_MAX);
-        request.timeoutMs = 0;
-        assert_int_equal(time_of_read(), UNITS);
-        request.unit = UNIT + 1;
-        assert_int_equal(time_of_read(), CLIENTS);
-        request.unit = UNIT;
-        assert_int_equal(time_of_read(), UNITS);
-        request.unit = UNIT + 2; /* It has no record. */
-        assert_int_equal(time_of_read(), CLIENTS);
-        request.unit = UNIT;
-        units[1].timeoutMs = 0;
-        assert_int_equal(time_of_read(), CLIENTS);
-        units[1].timeoutMs = UNITS;
-        assert_int_equal(time_of_read(), UNITS);
-        OK(mbm_client_setUnits(&client, NULL, 0));
-        assert_int_equal(time_of_read(), CLIENTS);
-    }
+    units[1].timeoutMs = UNITS;
+    OK(mbm_client_setUnits(&client, units, 2));
+    assert_int_equal(time_of_read(), UINT16_MAX);
+    request.timeoutMs = 0;
+    assert_int_equal(time_of_read(), UNITS);
+    request.unit = UNIT + 1;
+    assert_int_equal(time_of_read(), CLIENTS);
+    request.unit = UNIT;
+    assert_int_equal(time_of_read(), UNITS);
+    request.unit = UNIT + 2; /* It has no record. */
+    assert_int_equal(time_of_read(), CLIENTS);
+    request.unit = UNIT;
+    units[1].timeoutMs = 0;
+    assert_int_equal(time_of_read(), CLIENTS);
+    units[1].timeoutMs = UNITS;
+    assert_int_equal(time_of_read(), UNITS);
+    OK(mbm_client_setUnits(&client, NULL, 0));
+    assert_int_equal(time_of_read(), CLIENTS);
 }
 
-TEST(a_unit_and_a_timeout_that_are_too_large_are_refused)
+FRAMING_TEST(a_unit_and_a_timeout_that_are_too_large_are_refused)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        request.unit = 300; /* not 44 */
-        INVALID(client, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
-        IS(MBM_INVALID_ARGUMENT, request.status);
-        request.unit = 256; /* not a broadcast */
-        INVALID(client, mbm_client_writeSingleCoil(&client, &request, 0, 1));
-        request.unit = UINT16_MAX;
-        INVALID(client, mbm_client_readExceptionStatus(&client, &request));
-        request.unit = 255;
-        assert_int_equal(time_of_read(), CLIENTS);
+    begin(framing);
+    request.unit = 300; /* not 44 */
+    INVALID(client, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    IS(MBM_INVALID_ARGUMENT, request.status);
+    request.unit = 256; /* not a broadcast */
+    INVALID(client, mbm_client_writeSingleCoil(&client, &request, 0, 1));
+    request.unit = UINT16_MAX;
+    INVALID(client, mbm_client_readExceptionStatus(&client, &request));
+    request.unit = 255;
+    assert_int_equal(time_of_read(), CLIENTS);
 
-        request.timeoutMs = 1000001;
-        INVALID(client, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
-        IS(MBM_INVALID_ARGUMENT, request.status);
-        request.timeoutMs = UINT32_MAX;
-        INVALID(client, mbm_client_maskWriteRegister(&client, &request, 0, 0, 0));
-        request.timeoutMs = 100000; /* not 34464 */
-        assert_int_equal(time_of_read(), 100000);
-        request.timeoutMs = 1000000;
-        assert_int_equal(time_of_read(), 1000000);
-        assert_int_equal(mbm_client_pending(&client), 0);
-    }
+    request.timeoutMs = 1000001;
+    INVALID(client, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    IS(MBM_INVALID_ARGUMENT, request.status);
+    request.timeoutMs = UINT32_MAX;
+    INVALID(client, mbm_client_maskWriteRegister(&client, &request, 0, 0, 0));
+    request.timeoutMs = 100000; /* not 34464 */
+    assert_int_equal(time_of_read(), 100000);
+    request.timeoutMs = 1000000;
+    assert_int_equal(time_of_read(), 1000000);
+    assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-TEST(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused)
+FRAMING_TEST(a_record_with_a_unit_or_a_timeout_that_is_too_large_is_refused)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        units[1].timeoutMs = UNITS;
-        OK(mbm_client_setUnits(&client, units, 2));
-        units[0].unit = 300;
-        INVALID(client, mbm_client_setUnits(&client, units, 1));
-        units[0].unit = UNIT + 1;
-        units[0].timeoutMs = 1000001;
-        INVALID(client, mbm_client_setUnits(&client, units, 1));
-        assert_int_equal(time_of_read(), UNITS); /* as before the refused calls */
-        units[0].timeoutMs = 1000000;
-        OK(mbm_client_setUnits(&client, units, 2));
+    begin(framing);
+    units[1].timeoutMs = UNITS;
+    OK(mbm_client_setUnits(&client, units, 2));
+    units[0].unit = 300;
+    INVALID(client, mbm_client_setUnits(&client, units, 1));
+    units[0].unit = UNIT + 1;
+    units[0].timeoutMs = 1000001;
+    INVALID(client, mbm_client_setUnits(&client, units, 1));
+    assert_int_equal(time_of_read(), UNITS); /* as before the refused calls */
+    units[0].timeoutMs = 1000000;
+    OK(mbm_client_setUnits(&client, units, 2));
 
-        /* Changed later, which no call can refuse. */
-        request.unit = 44;
-        units[1].unit = 300;
-        assert_int_equal(time_of_read(), CLIENTS);
-        request.unit = UNIT;
-        units[1].unit = UNIT;
-        units[1].timeoutMs = 100000;
-        assert_int_equal(time_of_read(), 100000);
-        units[1].timeoutMs = UINT32_MAX;
-        assert_int_equal(time_of_read(), 1000000);
-    }
+    /* Changed later, which no call can refuse. */
+    request.unit = 44;
+    units[1].unit = 300;
+    assert_int_equal(time_of_read(), CLIENTS);
+    request.unit = UNIT;
+    units[1].unit = UNIT;
+    units[1].timeoutMs = 100000;
+    assert_int_equal(time_of_read(), 100000);
+    units[1].timeoutMs = UINT32_MAX;
+    assert_int_equal(time_of_read(), 1000000);
 }
 
 /* How often a read is sent that gets no reply. */
@@ -159,62 +153,58 @@ static unsigned sendings(void)
     return (unsigned)(m.sent_count / one);
 }
 
-TEST(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client)
+FRAMING_TEST(the_retries_of_a_request_override_those_of_the_unit_and_of_the_client)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        assert_int_equal(sendings(), 1);
-        OK(mbm_client_setRetries(&client, 2));
-        assert_int_equal(sendings(), 3);
-        request.retryLimit = 4;
-        assert_int_equal(sendings(), 5);
-        request.retryLimit = 1;
-        assert_int_equal(sendings(), 2);
-        request.retryLimit = MBM_NO_RETRIES;
-        assert_int_equal(sendings(), 1);
+    begin(framing);
+    assert_int_equal(sendings(), 1);
+    OK(mbm_client_setRetries(&client, 2));
+    assert_int_equal(sendings(), 3);
+    request.retryLimit = 4;
+    assert_int_equal(sendings(), 5);
+    request.retryLimit = 1;
+    assert_int_equal(sendings(), 2);
+    request.retryLimit = MBM_NO_RETRIES;
+    assert_int_equal(sendings(), 1);
 
-        units[1].retryLimit = 3;
-        OK(mbm_client_setUnits(&client, units, 2));
-        assert_int_equal(sendings(), 1);
-        request.retryLimit = 4;
-        assert_int_equal(sendings(), 5);
-        request.retryLimit = 0;
-        assert_int_equal(sendings(), 4);
-        assert_int_equal(units[1].retries, 4 + 3);
-        request.unit = UNIT + 1;
-        assert_int_equal(sendings(), 3);
-        request.unit = UNIT;
-        units[1].retryLimit = MBM_NO_RETRIES;
-        assert_int_equal(sendings(), 1);
-        request.retryLimit = 1;
-        assert_int_equal(sendings(), 2);
-        OK(mbm_client_setUnits(&client, NULL, 0));
-        request.retryLimit = 0;
-        assert_int_equal(sendings(), 3);
-        OK(mbm_client_setRetries(&client, 0));
-        request.retryLimit = 5;
-        assert_int_equal(sendings(), 6);
-    }
+    units[1].retryLimit = 3;
+    OK(mbm_client_setUnits(&client, units, 2));
+    assert_int_equal(sendings(), 1);
+    request.retryLimit = 4;
+    assert_int_equal(sendings(), 5);
+    request.retryLimit = 0;
+    assert_int_equal(sendings(), 4);
+    assert_int_equal(units[1].retries, 4 + 3);
+    request.unit = UNIT + 1;
+    assert_int_equal(sendings(), 3);
+    request.unit = UNIT;
+    units[1].retryLimit = MBM_NO_RETRIES;
+    assert_int_equal(sendings(), 1);
+    request.retryLimit = 1;
+    assert_int_equal(sendings(), 2);
+    OK(mbm_client_setUnits(&client, NULL, 0));
+    request.retryLimit = 0;
+    assert_int_equal(sendings(), 3);
+    OK(mbm_client_setRetries(&client, 0));
+    request.retryLimit = 5;
+    assert_int_equal(sendings(), 6);
 }
 
-TEST(a_client_that_repeats_nothing_refuses_a_request_with_retries)
+FRAMING_TEST(a_client_that_repeats_nothing_refuses_a_request_with_retries)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        request.retryLimit = 1;
-        IS(MBM_INVALID_ARGUMENT, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
-        IS(MBM_INVALID_ARGUMENT, request.status);
-        assert_int_equal(mbm_client_pending(&client), 0);
-        request.retryLimit = MBM_NO_RETRIES;
-        assert_int_equal(sendings(), 1);
-        request.retryLimit = 1;
-        switch (i % 3) {
-        case 0: OK(mbm_client_setRetries(&client, 0)); break;
-        case 1: OK(mbm_client_setUnits(&client, units, 2)); break;
-        default: OK(mbm_client_setBusyRetries(&client, 0, 0)); break;
-        }
-        assert_int_equal(sendings(), 2);
+    begin(framing);
+    request.retryLimit = 1;
+    IS(MBM_INVALID_ARGUMENT, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    IS(MBM_INVALID_ARGUMENT, request.status);
+    assert_int_equal(mbm_client_pending(&client), 0);
+    request.retryLimit = MBM_NO_RETRIES;
+    assert_int_equal(sendings(), 1);
+    request.retryLimit = 1;
+    switch (framing % 3) {
+    case 0: OK(mbm_client_setRetries(&client, 0)); break;
+    case 1: OK(mbm_client_setUnits(&client, units, 2)); break;
+    default: OK(mbm_client_setBusyRetries(&client, 0, 0)); break;
     }
+    assert_int_equal(sendings(), 2);
 }
 
 /* Delivers the exception to the request that was sent last. */
@@ -261,48 +251,44 @@ static unsigned refusals(int framing, uint8_t function, uint8_t code, uint32_t w
     return count;
 }
 
-TEST(a_busy_device_gets_its_request_again_after_the_wait)
+FRAMING_TEST(a_busy_device_gets_its_request_again_after_the_wait)
 {
     enum { WAIT = 250 };
 
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, 0), 1);
-        OK(mbm_client_setRetries(&client, 9));
-        assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, 0), 1);
-        OK(mbm_client_setBusyRetries(&client, 3, WAIT));
-        assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, WAIT), 4);
-        assert_int_equal(refusals(framings[i], 6, SERVER_DEVICE_BUSY, WAIT), 4);
-        assert_int_equal(refusals(framings[i], 3, ACKNOWLEDGE, WAIT), 4);
-        /* The device carries the write out, so it must not be sent again. */
-        assert_int_equal(refusals(framings[i], 6, ACKNOWLEDGE, WAIT), 1);
-        assert_int_equal(refusals(framings[i], 3, MBM_SERVER_DEVICE_FAILURE, WAIT), 1);
-        /* The setting stays if that of other repetitions changes. */
-        OK(mbm_client_setRetries(&client, 0));
-        assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, WAIT), 4);
-        OK(mbm_client_setBusyRetries(&client, 0, WAIT));
-        assert_int_equal(refusals(framings[i], 3, SERVER_DEVICE_BUSY, WAIT), 1);
-    }
+    begin(framing);
+    assert_int_equal(refusals(framing, 3, SERVER_DEVICE_BUSY, 0), 1);
+    OK(mbm_client_setRetries(&client, 9));
+    assert_int_equal(refusals(framing, 3, SERVER_DEVICE_BUSY, 0), 1);
+    OK(mbm_client_setBusyRetries(&client, 3, WAIT));
+    assert_int_equal(refusals(framing, 3, SERVER_DEVICE_BUSY, WAIT), 4);
+    assert_int_equal(refusals(framing, 6, SERVER_DEVICE_BUSY, WAIT), 4);
+    assert_int_equal(refusals(framing, 3, ACKNOWLEDGE, WAIT), 4);
+    /* The device carries the write out, so it must not be sent again. */
+    assert_int_equal(refusals(framing, 6, ACKNOWLEDGE, WAIT), 1);
+    assert_int_equal(refusals(framing, 3, MBM_SERVER_DEVICE_FAILURE, WAIT), 1);
+    /* The setting stays if that of other repetitions changes. */
+    OK(mbm_client_setRetries(&client, 0));
+    assert_int_equal(refusals(framing, 3, SERVER_DEVICE_BUSY, WAIT), 4);
+    OK(mbm_client_setBusyRetries(&client, 0, WAIT));
+    assert_int_equal(refusals(framing, 3, SERVER_DEVICE_BUSY, WAIT), 1);
 }
 
-TEST(refusals_and_lost_replies_are_counted_apart)
+FRAMING_TEST(refusals_and_lost_replies_are_counted_apart)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        OK(mbm_client_setUnits(&client, units, 2));
-        OK(mbm_client_setRetries(&client, 1));
-        OK(mbm_client_setBusyRetries(&client, 2, 20));
-        IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
-        for (unsigned k = 0; k < 4; k++) {
-            m.sent_count = 0;
-            memory_port_send(&m, &client);
-            if (k < 2)
-                refuse(framings[i], 3, SERVER_DEVICE_BUSY);
-        }
-        IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, STEPS));
-        assert_int_equal(units[1].retries, 3);
-        assert_int_equal(units[1].requests, 1);
+    begin(framing);
+    OK(mbm_client_setUnits(&client, units, 2));
+    OK(mbm_client_setRetries(&client, 1));
+    OK(mbm_client_setBusyRetries(&client, 2, 20));
+    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, 1));
+    for (unsigned k = 0; k < 4; k++) {
+        m.sent_count = 0;
+        memory_port_send(&m, &client);
+        if (k < 2)
+            refuse(framing, 3, SERVER_DEVICE_BUSY);
     }
+    IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, STEPS));
+    assert_int_equal(units[1].retries, 3);
+    assert_int_equal(units[1].requests, 1);
 }
 
 static asker a;

@@ -1,21 +1,19 @@
 /* A client's link: when it is opened again, and what becomes of requests meanwhile. */
 #include "linked.h"
 
-TEST(a_link_is_opened_in_the_first_poll)
+FRAMING_TEST(a_link_is_opened_in_the_first_poll)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        assert_int_equal(mbm_link_state(&kept), 0);
-        assert_int_equal(connects, 0);
-        assert_int_equal(mbm_client_pollDelay(&client), 0);
-        OK(mbm_client_poll(&client));
-        assert_int_equal(connects, 1);
-        assert_int_equal(disconnects, 0);
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
-        assert_int_equal(mbm_client_isConnected(&client), 1);
-        assert_string_equal(events, "C00 ");
-        reads_right(framings[i]);
-    }
+    begin(framing);
+    assert_int_equal(mbm_link_state(&kept), 0);
+    assert_int_equal(connects, 0);
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    OK(mbm_client_poll(&client));
+    assert_int_equal(connects, 1);
+    assert_int_equal(disconnects, 0);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+    assert_int_equal(mbm_client_isConnected(&client), 1);
+    assert_string_equal(events, "C00 ");
+    reads_right(framing);
 }
 
 TEST(a_link_that_is_open_already_is_used_as_it_is)
@@ -37,57 +35,52 @@ TEST(a_link_that_is_open_already_is_used_as_it_is)
     assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
-TEST(the_loss_of_the_link_is_noticed_while_the_client_is_idle)
+FRAMING_TEST(the_loss_of_the_link_is_noticed_while_the_client_is_idle)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
-        run(10000);
-        assert_string_equal(events, "");
-        m.is_lost = 1;
-        OK(mbm_client_poll(&client));
-        assert_string_equal(events, "LE6 ");
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
-        assert_int_equal(mbm_client_isConnected(&client), 0);
-        assert_int_equal(disconnects, 1);
-        assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
-        assert_int_equal(next_attempt(), 500);
-        assert_string_equal(events, "LE6 C00 ");
-        assert_int_equal(mbm_client_isConnected(&client), 1);
-        assert_int_equal(disconnects, 1);
-        assert_int_equal(counters.attempts, 2);
-        assert_int_equal(counters.connected, 2);
-        assert_int_equal(counters.lost, 1);
-        assert_int_equal(counters.failed, 0);
-    }
+    begin_up(framing);
+    assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
+    run(10000);
+    assert_string_equal(events, "");
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    assert_string_equal(events, "LE6 ");
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+    assert_int_equal(mbm_client_isConnected(&client), 0);
+    assert_int_equal(disconnects, 1);
+    assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
+    assert_int_equal(next_attempt(), 500);
+    assert_string_equal(events, "LE6 C00 ");
+    assert_int_equal(mbm_client_isConnected(&client), 1);
+    assert_int_equal(disconnects, 1);
+    assert_int_equal(counters.attempts, 2);
+    assert_int_equal(counters.connected, 2);
+    assert_int_equal(counters.lost, 1);
+    assert_int_equal(counters.failed, 0);
 }
 
-TEST(bytes_that_arrive_while_the_client_is_idle_are_dropped)
+FRAMING_TEST(bytes_that_arrive_while_the_client_is_idle_are_dropped)
 {
     static const uint8_t late[] = {0, 9, 0, 0, 0, 5, UNIT, 3, 2, 0xAA, 0xAA, 0, 9, 0, 0};
+    mbm_counters counted = {0};
 
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        mbm_counters counted = {0};
-
-        begin_up(framings[i]);
-        OK(mbm_client_setCounters(&client, &counted));
-        memory_port_bytes(&m, late, sizeof late);
-        OK(mbm_client_poll(&client));
-        OK(mbm_client_poll(&client));
-        assert_int_equal(m.arriving_count, 0);
-        assert_int_equal(counted.bytesReceived, sizeof late);
-        /* A frame that has begun while the client was idle does not hide the reply. */
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        if (framings[i] == MBM_FRAMING_TCP) {
-            assert_int_equal(counted.foreignFrames, 1);
-            memory_port_bytes(&m, late + 4, 7);
-        }
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-        assert_int_equal(words[0], 0x1234);
-        assert_int_equal(counted.resynchronisations, 0);
+    begin_up(framing);
+    OK(mbm_client_setCounters(&client, &counted));
+    memory_port_bytes(&m, late, sizeof late);
+    OK(mbm_client_poll(&client));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(m.arriving_count, 0);
+    assert_int_equal(counted.bytesReceived, sizeof late);
+    /* A frame that has begun while the client was idle does not hide the reply. */
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    if (framing == MBM_FRAMING_TCP) {
+        assert_int_equal(counted.foreignFrames, 1);
+        memory_port_bytes(&m, late + 4, 7);
     }
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    assert_int_equal(words[0], 0x1234);
+    assert_int_equal(counted.resynchronisations, 0);
 }
 
 TEST(the_gap_is_kept_after_bytes_that_arrived_while_idle)
@@ -160,78 +153,72 @@ TEST(jitter_shortens_the_wait)
     assert_in_range(next_attempt(), 740, 760);
 }
 
-TEST(requests_fail_while_the_link_is_down)
+FRAMING_TEST(requests_fail_while_the_link_is_down)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        connects_with = MBM_LINK_LOST;
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        queue_read(&other);
-        m.is_lost = 1;
-        IS(MBM_OK, mbm_client_poll(&client));
-        IS(MBM_LINK_LOST, request.status);
-        IS(MBM_LINK_LOST, other.status);
-        assert_string_equal(events, "LE6 ");
-        queue_read(&other);
-        assert_int_equal(mbm_client_pollDelay(&client), 0);
-        OK(mbm_client_poll(&client));
-        IS(MBM_LINK_LOST, other.status);
-        assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
-    }
+    begin_up(framing);
+    connects_with = MBM_LINK_LOST;
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    queue_read(&other);
+    m.is_lost = 1;
+    IS(MBM_OK, mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    IS(MBM_LINK_LOST, other.status);
+    assert_string_equal(events, "LE6 ");
+    queue_read(&other);
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, other.status);
+    assert_int_equal(mbm_client_pollDelay(&client), 500 * MS);
 }
 
-TEST(requests_that_were_not_sent_wait_for_the_link)
+FRAMING_TEST(requests_that_were_not_sent_wait_for_the_link)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        OK(mbm_link_setRequestsWait(&kept, 1));
-        OK(mbm_client_setInFlight(&client, 1));
-        OK(mbm_client_setRetries(&client, 3));
-        connects_with = MBM_LINK_LOST;
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        queue_read(&other);
-        IS(MBM_PENDING, mbm_client_poll(&client));
-        m.is_lost = 1;
-        IS(MBM_PENDING, mbm_client_poll(&client));
-        /* The device may have carried it out, so it is not repeated. */
-        IS(MBM_LINK_LOST, request.status);
-        IS(MBM_PENDING, other.status);
-        queue_read(&request);
-        run(100000);
-        IS(MBM_PENDING, other.status);
-        IS(MBM_PENDING, request.status);
-        OK(mbm_client_cancel(&client, &request));
-        IS(MBM_CANCELLED, request.status);
-        connects_with = MBM_OK;
-        m.sent_count = 0;
-        (void)next_attempt();
-        memory_port_send(&m, &client);
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
-        assert_int_equal(mbm_client_pending(&client), 0);
-    }
+    begin_up(framing);
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    OK(mbm_client_setInFlight(&client, 1));
+    OK(mbm_client_setRetries(&client, 3));
+    connects_with = MBM_LINK_LOST;
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    queue_read(&other);
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    m.is_lost = 1;
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    /* The device may have carried it out, so it is not repeated. */
+    IS(MBM_LINK_LOST, request.status);
+    IS(MBM_PENDING, other.status);
+    queue_read(&request);
+    run(100000);
+    IS(MBM_PENDING, other.status);
+    IS(MBM_PENDING, request.status);
+    OK(mbm_client_cancel(&client, &request));
+    IS(MBM_CANCELLED, request.status);
+    connects_with = MBM_OK;
+    m.sent_count = 0;
+    (void)next_attempt();
+    memory_port_send(&m, &client);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
+    assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-TEST(requests_wait_while_the_first_connection_is_being_made)
+FRAMING_TEST(requests_wait_while_the_first_connection_is_being_made)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        connects_with = MBM_PENDING;
-        queue_read(&request);
-        IS(MBM_PENDING, mbm_client_poll(&client));
-        status_is = MBM_PENDING;
-        run(9000);
-        IS(MBM_PENDING, request.status);
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
-        assert_int_equal(connects, 1);
-        m.is_lost = 0;
-        status_is = MBM_OK;
-        memory_port_send(&m, &client);
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-    }
+    begin(framing);
+    connects_with = MBM_PENDING;
+    queue_read(&request);
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    status_is = MBM_PENDING;
+    run(9000);
+    IS(MBM_PENDING, request.status);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    assert_int_equal(connects, 1);
+    m.is_lost = 0;
+    status_is = MBM_OK;
+    memory_port_send(&m, &client);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
 }
 
 TEST(a_connection_that_takes_too_long_has_failed)
@@ -350,51 +337,48 @@ static void act(void *context, uint8_t event, uint8_t status)
     }
 }
 
-TEST(the_callback_may_use_link_and_client)
+FRAMING_TEST(the_callback_may_use_link_and_client)
 {
     static const uint8_t after[] = {MBM_OK, MBM_OK, MBM_OK, MBM_NOT_INITIALISED,
                                     MBM_OK, MBM_OK, MBM_OK, MBM_OK};
 
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (what = 0; what < 8; what++) {
-            begin_up(framings[i]);
-            OK(mbm_link_setCallback(&kept, act, NULL));
-            called = 0;
-            m.is_lost = 1;
-            /* The link was lost before, so a request of the callback ends. */
-            IS(MBM_OK, mbm_client_poll(&client));
-            assert_int_equal(called, 1);
-            m.is_lost = 0;
-            IS(after[what], mbm_client_poll(&client));
-            run(1000);
-            assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4   ? 0
-                                                    : what == 2 || what == 3 ? MBM_LINK_IS_DOWN
-                                                                             : MBM_LINK_IS_UP);
-            if (what == 5)
-                IS(MBM_LINK_LOST, request.status);
-        }
+    for (what = 0; what < 8; what++) {
+        begin_up(framing);
+        OK(mbm_link_setCallback(&kept, act, NULL));
+        called = 0;
+        m.is_lost = 1;
+        /* The link was lost before, so a request of the callback ends. */
+        IS(MBM_OK, mbm_client_poll(&client));
+        assert_int_equal(called, 1);
+        m.is_lost = 0;
+        IS(after[what], mbm_client_poll(&client));
+        run(1000);
+        assert_int_equal(mbm_link_state(&kept), what == 0 || what == 4   ? 0
+                                                : what == 2 || what == 3 ? MBM_LINK_IS_DOWN
+                                                                         : MBM_LINK_IS_UP);
+        if (what == 5)
+            IS(MBM_LINK_LOST, request.status);
+    }
 }
 
-TEST(a_client_without_its_link_works_as_before)
+FRAMING_TEST(a_client_without_its_link_works_as_before)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        OK(mbm_link_end(&kept));
-        IS(MBM_NOT_INITIALISED, mbm_link_end(&kept));
-        assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
-        m.is_lost = 1;
-        OK(mbm_client_poll(&client));
-        m.is_lost = 0;
-        reads_right(framings[i]);
-        m.is_lost = 1;
-        queue_read(&request);
-        IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 1000));
-        assert_string_equal(events, "");
-        m.is_lost = 0;
-        OK(mbm_link_begin(&kept, &client, &hooks));
-        OK(mbm_client_poll(&client));
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
-    }
+    begin_up(framing);
+    OK(mbm_link_end(&kept));
+    IS(MBM_NOT_INITIALISED, mbm_link_end(&kept));
+    assert_int_equal(mbm_client_pollDelay(&client), UINT32_MAX);
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    m.is_lost = 0;
+    reads_right(framing);
+    m.is_lost = 1;
+    queue_read(&request);
+    IS(MBM_LINK_LOST, memory_port_run(&m, &client, &request, 1000));
+    assert_string_equal(events, "");
+    m.is_lost = 0;
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
 }
 
 TEST(a_client_that_is_begun_again_has_no_link)
@@ -481,18 +465,16 @@ TEST(a_suspended_client_leaves_its_link_alone)
     OK(mbm_client_resume(&client, &line));
 }
 
-TEST(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link)
+FRAMING_TEST(a_lost_link_and_a_timeout_in_one_poll_are_a_lost_link)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        m.now += 10000 * MS;
-        m.is_lost = 1;
-        OK(mbm_client_poll(&client));
-        IS(MBM_LINK_LOST, request.status);
-        assert_string_equal(events, "LE6 ");
-    }
+    begin_up(framing);
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    m.now += 10000 * MS;
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    assert_string_equal(events, "LE6 ");
 }
 
 TEST(a_reconnection_on_demand_closes_the_link_and_opens_it_at_once)

@@ -60,49 +60,45 @@ TEST(a_request_that_finds_the_link_closed_opens_it_at_once)
 }
 
 /* A device that serves one request with each connection. */
-TEST(a_peer_that_closes_the_link_after_each_reply_answers_each_request)
+STREAM_TEST(a_peer_that_closes_the_link_after_each_reply_answers_each_request)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_good(streams[i]);
-        for (unsigned round = 0; round < 20; round++) {
-            m.is_lost = 1;
-            queue_read(&request);
-            m.sent_count = 0;
-            is_answered(streams[i], &request);
-            events[0] = '\0';
-        }
-        assert_int_equal(connects, 20);
-        assert_int_equal(counters.failed, 0);
+    begin_good(framing);
+    for (unsigned round = 0; round < 20; round++) {
+        m.is_lost = 1;
+        queue_read(&request);
+        m.sent_count = 0;
+        is_answered(framing, &request);
+        events[0] = '\0';
     }
+    assert_int_equal(connects, 20);
+    assert_int_equal(counters.failed, 0);
 }
 
-TEST(a_request_waits_for_the_opening_as_long_as_its_response_timeout)
+FRAMING_TEST(a_request_waits_for_the_opening_as_long_as_its_response_timeout)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_good(framings[i]);
-        m.is_lost = 1;
-        connects_with = status_is = MBM_PENDING;
-        other.timeoutMs = 900;
-        queue_read(&request);
-        queue_read(&other);
-        run(299);
-        IS(MBM_PENDING, request.status);
-        run(60);
-        IS(MBM_CONNECT_TIMED_OUT, request.status);
-        IS(MBM_PENDING, other.status);
-        run(540);
-        IS(MBM_PENDING, other.status);
-        run(60);
-        IS(MBM_CONNECT_TIMED_OUT, other.status);
-        /* The attempt itself goes on. */
-        assert_int_equal(connects, 1);
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
-        assert_int_equal(m.sent_count, 0);
-        m.is_lost = 0;
-        status_is = MBM_OK;
-        queue_read(&request);
-        is_answered(framings[i], &request);
-    }
+    begin_good(framing);
+    m.is_lost = 1;
+    connects_with = status_is = MBM_PENDING;
+    other.timeoutMs = 900;
+    queue_read(&request);
+    queue_read(&other);
+    run(299);
+    IS(MBM_PENDING, request.status);
+    run(60);
+    IS(MBM_CONNECT_TIMED_OUT, request.status);
+    IS(MBM_PENDING, other.status);
+    run(540);
+    IS(MBM_PENDING, other.status);
+    run(60);
+    IS(MBM_CONNECT_TIMED_OUT, other.status);
+    /* The attempt itself goes on. */
+    assert_int_equal(connects, 1);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    assert_int_equal(m.sent_count, 0);
+    m.is_lost = 0;
+    status_is = MBM_OK;
+    queue_read(&request);
+    is_answered(framing, &request);
 }
 
 TEST(requests_that_wait_for_the_link_wait_longer)
@@ -119,24 +115,22 @@ TEST(requests_that_wait_for_the_link_wait_longer)
     is_answered(MBM_FRAMING_TCP, &request);
 }
 
-TEST(only_a_failed_opening_backs_off)
+FRAMING_TEST(only_a_failed_opening_backs_off)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_good(framings[i]);
-        m.is_lost = 1;
-        connects_with = MBM_LINK_LOST;
-        queue_read(&request);
-        run(1);
-        IS(MBM_LINK_LOST, request.status);
-        assert_string_equal(events, "LE6 FE6 ");
-        queue_read(&request);
-        OK(mbm_client_poll(&client));
-        IS(MBM_LINK_LOST, request.status);
-        assert_int_equal(connects, 1);
-        assert_in_range(next_attempt(), 498, 500);
-        assert_int_equal(next_attempt(), 1000);
-        assert_int_equal(m.sent_count, 0);
-    }
+    begin_good(framing);
+    m.is_lost = 1;
+    connects_with = MBM_LINK_LOST;
+    queue_read(&request);
+    run(1);
+    IS(MBM_LINK_LOST, request.status);
+    assert_string_equal(events, "LE6 FE6 ");
+    queue_read(&request);
+    OK(mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    assert_int_equal(connects, 1);
+    assert_in_range(next_attempt(), 498, 500);
+    assert_int_equal(next_attempt(), 1000);
+    assert_int_equal(m.sent_count, 0);
 }
 
 TEST(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request)
@@ -154,54 +148,50 @@ TEST(a_peer_that_closes_each_connection_at_once_is_not_asked_for_each_request)
     assert_in_range(connects, 4, 6);
 }
 
-TEST(a_request_that_was_sent_is_not_sent_again_over_the_new_link)
+FRAMING_TEST(a_request_that_was_sent_is_not_sent_again_over_the_new_link)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_good(framings[i]);
-        OK(mbm_client_setRetries(&client, 3));
-        IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
-        memory_port_send(&m, &client);
-        m.is_lost = 1;
-        queue_read(&other);
-        run(1);
-        IS(MBM_LINK_LOST, request.status);
-        m.sent_count = 0;
-        is_answered(framings[i], &other);
-        assert_int_equal(connects, 1);
-        assert_int_equal(m.sent[framings[i] == MBM_FRAMING_TCP ? 7 : 1],
-                         framings[i] == MBM_FRAMING_ASCII ? '0' : 3);
-        run(5000);
-        assert_int_equal(mbm_client_pending(&client), 0);
-    }
+    begin_good(framing);
+    OK(mbm_client_setRetries(&client, 3));
+    IS(MBM_PENDING, mbm_client_writeSingleRegister(&client, &request, 1, 2));
+    memory_port_send(&m, &client);
+    m.is_lost = 1;
+    queue_read(&other);
+    run(1);
+    IS(MBM_LINK_LOST, request.status);
+    m.sent_count = 0;
+    is_answered(framing, &other);
+    assert_int_equal(connects, 1);
+    assert_int_equal(m.sent[framing == MBM_FRAMING_TCP ? 7 : 1],
+                     framing == MBM_FRAMING_ASCII ? '0' : 3);
+    run(5000);
+    assert_int_equal(mbm_client_pending(&client), 0);
 }
 
-TEST(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request)
+FRAMING_TEST(a_link_that_its_peer_closes_twice_while_idle_waits_for_a_request)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_good(framings[i]);
-        OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
-        m.is_lost = 1;
-        OK(mbm_client_poll(&client));
-        assert_int_equal(next_attempt(), 1000);
-        run(2000);
-        m.is_lost = 1;
-        run(3600000);
-        assert_int_equal(connects, 1);
-        assert_in_range(mbm_client_pollDelay(&client), 1, 1000 * MS);
-        queue_read(&request);
-        assert_int_equal(mbm_client_pollDelay(&client), 0);
-        is_answered(framings[i], &request);
-        assert_int_equal(connects, 2);
-        /* Its answer shows that it is in use: it is opened again without a request, once. */
-        m.is_lost = 1;
-        run(2100);
-        assert_int_equal(connects, 3);
-        m.is_lost = 1;
-        run(100000);
-        assert_int_equal(connects, 3);
-        OK(mbm_link_reconnect(&kept));
-        assert_int_equal(next_attempt(), 0);
-    }
+    begin_good(framing);
+    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_FIXED, 1000, 1000));
+    m.is_lost = 1;
+    OK(mbm_client_poll(&client));
+    assert_int_equal(next_attempt(), 1000);
+    run(2000);
+    m.is_lost = 1;
+    run(3600000);
+    assert_int_equal(connects, 1);
+    assert_in_range(mbm_client_pollDelay(&client), 1, 1000 * MS);
+    queue_read(&request);
+    assert_int_equal(mbm_client_pollDelay(&client), 0);
+    is_answered(framing, &request);
+    assert_int_equal(connects, 2);
+    /* Its answer shows that it is in use: it is opened again without a request, once. */
+    m.is_lost = 1;
+    run(2100);
+    assert_int_equal(connects, 3);
+    m.is_lost = 1;
+    run(100000);
+    assert_int_equal(connects, 3);
+    OK(mbm_link_reconnect(&kept));
+    assert_int_equal(next_attempt(), 0);
 }
 
 /* --- a device that falls silent --- */
@@ -214,94 +204,84 @@ static void is_unanswered(mbm_clientRequest *which)
     IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, which, 1000));
 }
 
-TEST(a_silent_connection_is_replaced_after_two_requests)
+STREAM_TEST(a_silent_connection_is_replaced_after_two_requests)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_good(streams[i]);
-        for (unsigned round = 1; round < 5; round++) {
-            events[0] = '\0';
-            is_unanswered(&request);
-            assert_int_equal(connects, round - 1);
-            is_unanswered(&request);
-            m.sent_count = 0;
-            queue_read(&request);
-            is_answered(streams[i], &request);
-            assert_int_equal(connects, round);
-            assert_int_equal(disconnects, round);
-            assert_string_equal(events, "LE2 C00 ");
-            assert_int_equal(counters.lost, round);
-        }
+    begin_good(framing);
+    for (unsigned round = 1; round < 5; round++) {
+        events[0] = '\0';
+        is_unanswered(&request);
+        assert_int_equal(connects, round - 1);
+        is_unanswered(&request);
+        m.sent_count = 0;
+        queue_read(&request);
+        is_answered(framing, &request);
+        assert_int_equal(connects, round);
+        assert_int_equal(disconnects, round);
+        assert_string_equal(events, "LE2 C00 ");
+        assert_int_equal(counters.lost, round);
     }
 }
 
 /* A unit on a gateway's line is absent, and the gateway sends nothing. Another one is there. */
-TEST(a_silent_unit_costs_the_others_no_request)
+STREAM_TEST(a_silent_unit_costs_the_others_no_request)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_up(streams[i]);
-        connects = 0;
-        OK(mbm_client_setResponseTimeout(&client, 20));
-        /* After 2, 4, 8 and 16 requests. */
-        for (unsigned round = 0; round < 30; round++)
-            is_unanswered(&request);
-        assert_int_equal(counters.lost, 4);
-        m.sent_count = 0;
-        queue_read(&other);
-        is_answered(streams[i], &other);
-        assert_int_equal(connects, 4);
-        assert_int_equal(counters.failed, 0);
-    }
+    begin_up(framing);
+    connects = 0;
+    OK(mbm_client_setResponseTimeout(&client, 20));
+    /* After 2, 4, 8 and 16 requests. */
+    for (unsigned round = 0; round < 30; round++)
+        is_unanswered(&request);
+    assert_int_equal(counters.lost, 4);
+    m.sent_count = 0;
+    queue_read(&other);
+    is_answered(framing, &other);
+    assert_int_equal(connects, 4);
+    assert_int_equal(counters.failed, 0);
 }
 
-TEST(a_repetition_goes_over_the_new_connection)
+STREAM_TEST(a_repetition_goes_over_the_new_connection)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_good(streams[i]);
-        OK(mbm_client_setRetries(&client, 2));
-        queue_read(&request);
-        run(301);
-        assert_int_equal(connects, 0);
-        m.sent_count = 0;
-        run(301);
-        assert_int_equal(connects, 1);
-        is_answered(streams[i], &request);
-    }
+    begin_good(framing);
+    OK(mbm_client_setRetries(&client, 2));
+    queue_read(&request);
+    run(301);
+    assert_int_equal(connects, 0);
+    m.sent_count = 0;
+    run(301);
+    assert_int_equal(connects, 1);
+    is_answered(framing, &request);
 }
 
-TEST(any_byte_begins_the_count_anew)
+STREAM_TEST(any_byte_begins_the_count_anew)
 {
     static const uint8_t noise = 0xA5;
 
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_good(streams[i]);
-        for (unsigned round = 0; round < 20; round++) {
-            queue_read(&request);
-            memory_port_send(&m, &client);
-            if (round % 2)
-                memory_port_bytes(&m, &noise, 1);
-            (void)memory_port_run(&m, &client, &request, 1000);
-            assert_int_not_equal(request.status, MBM_OK);
-        }
-        assert_int_equal(connects, 0);
+    begin_good(framing);
+    for (unsigned round = 0; round < 20; round++) {
+        queue_read(&request);
+        memory_port_send(&m, &client);
+        if (round % 2)
+            memory_port_bytes(&m, &noise, 1);
+        (void)memory_port_run(&m, &client, &request, 1000);
+        assert_int_not_equal(request.status, MBM_OK);
     }
+    assert_int_equal(connects, 0);
 }
 
-TEST(requests_of_a_program_with_limits_of_its_own_count_too)
+STREAM_TEST(requests_of_a_program_with_limits_of_its_own_count_too)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_good(streams[i]);
-        /* Each is cancelled after 20 ms. The response timeout is 300 ms. */
-        for (unsigned round = 0; round < 15; round++) {
-            assert_int_equal(connects, 0);
-            queue_read(&request);
-            run(20);
-            OK(mbm_client_cancel(&client, &request));
-        }
-        run(100);
+    begin_good(framing);
+    /* Each is cancelled after 20 ms. The response timeout is 300 ms. */
+    for (unsigned round = 0; round < 15; round++) {
+        assert_int_equal(connects, 0);
         queue_read(&request);
         run(20);
-        assert_int_equal(connects, 1);
+        OK(mbm_client_cancel(&client, &request));
     }
+    run(100);
+    queue_read(&request);
+    run(20);
+    assert_int_equal(connects, 1);
 }
 
 TEST(cancelled_requests_alone_do_not_close_a_connection)
@@ -518,97 +498,91 @@ TEST_ROW(requests_that_were_sent_end_when_a_link_begins_that_is_closed,
 TEST_ROW(a_request_that_the_port_took_in_part_is_not_sent_on_over_the_new_link,
          requests_in_flight_end_when_the_link_was_closed(5))
 
-TEST(a_request_that_ended_with_the_old_link_is_never_sent)
+FRAMING_TEST(a_request_that_ended_with_the_old_link_is_never_sent)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned j = 0; j < COUNT(courses); j++) {
-            begin_in_flight(framings[i], NOTHING);
-            assert_int_equal(m.sent_count, 0);
-            status_is = courses[j].status_is;
-            connects_with = courses[j].connects_with;
-            begin_link();
-            (void)mbm_client_poll(&client);
-            status_is = MBM_LINK_LOST;
-            run(50);
-            IS(MBM_LINK_LOST, request.status);
-            connects_with = MBM_OK;
-            run(2000);
-            works_over_the_new_link(framings[i]);
-        }
-}
-
-TEST(half_a_reply_of_the_old_peer_is_dropped)
-{
-    static const uint8_t half_rtu[] = {UNIT, 3, 2}, half_tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 6};
-
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_in_flight(framings[i], ALL);
-        if (framings[i] == MBM_FRAMING_TCP)
-            memory_port_bytes(&m, half_tcp, sizeof half_tcp);
-        else if (framings[i] == MBM_FRAMING_ASCII)
-            memory_port_bytes(&m, (const uint8_t *)":0703", 5);
-        else
-            memory_port_bytes(&m, half_rtu, sizeof half_rtu);
-        m.now += MS;
-        IS(MBM_PENDING, mbm_client_poll(&client));
+    for (unsigned j = 0; j < COUNT(courses); j++) {
+        begin_in_flight(framing, NOTHING);
+        assert_int_equal(m.sent_count, 0);
+        status_is = courses[j].status_is;
+        connects_with = courses[j].connects_with;
         begin_link();
-        m.sent_count = 0;
-        run(20);
+        (void)mbm_client_poll(&client);
+        status_is = MBM_LINK_LOST;
+        run(50);
         IS(MBM_LINK_LOST, request.status);
-        works_over_the_new_link(framings[i]);
+        connects_with = MBM_OK;
+        run(2000);
+        works_over_the_new_link(framing);
     }
 }
 
-TEST(a_request_in_flight_goes_on_if_the_link_is_found_open)
+FRAMING_TEST(half_a_reply_of_the_old_peer_is_dropped)
+{
+    static const uint8_t half_rtu[] = {UNIT, 3, 2}, half_tcp[] = {0, 0, 0, 0, 0, 5, UNIT, 6};
+
+    begin_in_flight(framing, ALL);
+    if (framing == MBM_FRAMING_TCP)
+        memory_port_bytes(&m, half_tcp, sizeof half_tcp);
+    else if (framing == MBM_FRAMING_ASCII)
+        memory_port_bytes(&m, (const uint8_t *)":0703", 5);
+    else
+        memory_port_bytes(&m, half_rtu, sizeof half_rtu);
+    m.now += MS;
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    begin_link();
+    m.sent_count = 0;
+    run(20);
+    IS(MBM_LINK_LOST, request.status);
+    works_over_the_new_link(framing);
+}
+
+FRAMING_TEST(a_request_in_flight_goes_on_if_the_link_is_found_open)
 {
     static const uint8_t reply[] = {UNIT, 6, 0, 7, 0xBE, 0xEF};
     uint8_t tcp[] = {0, 0, 0, 0, 0, 6, UNIT, 6, 0, 7, 0xBE, 0xEF};
 
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned waits = 0; waits < 2; waits++) {
-            begin_in_flight(framings[i], ALL);
-            status_is = waits ? MBM_PENDING : MBM_OK;
-            begin_link();
-            IS(MBM_PENDING, mbm_client_poll(&client));
-            status_is = MBM_OK;
-            IS(MBM_PENDING, mbm_client_poll(&client));
-            assert_int_equal(connects + disconnects, 0);
-            assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
-            if (framings[i] == MBM_FRAMING_TCP)
-                memory_port_bytes(&m, tcp, sizeof tcp);
-            else if (framings[i] == MBM_FRAMING_ASCII)
-                memory_port_bytes(&m, (const uint8_t *)":07060007BEEF3F\r\n", 17);
-            else
-                memory_port_rtu(&m, reply, sizeof reply);
-            IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-            m.sent_count = 0;
-            works_over_the_new_link(framings[i]);
-        }
-}
-
-TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
-{
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        mbm_clientRequest second = {.unit = UNIT};
-
-        begin_in_flight(framings[i], NOTHING);
-        status_is = MBM_PENDING;
+    for (unsigned waits = 0; waits < 2; waits++) {
+        begin_in_flight(framing, ALL);
+        status_is = waits ? MBM_PENDING : MBM_OK;
         begin_link();
         IS(MBM_PENDING, mbm_client_poll(&client));
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
-        /* A queued request that the reconnection must leave as it is. */
-        IS(MBM_PENDING, mbm_client_readCoils(&client, &second, 0, 1));
-        OK(mbm_link_reconnect(&kept));
-        connects_with = MBM_PENDING;
-        IS(MBM_PENDING, mbm_client_poll(&client));
-        IS(MBM_LINK_LOST, request.status);
-        IS(MBM_PENDING, second.status);
-        assert_int_equal(disconnects, 1);
-        OK(mbm_client_cancel(&client, &second));
         status_is = MBM_OK;
-        IS(MBM_OK, mbm_client_poll(&client));
-        works_over_the_new_link(framings[i]);
+        IS(MBM_PENDING, mbm_client_poll(&client));
+        assert_int_equal(connects + disconnects, 0);
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_UP);
+        if (framing == MBM_FRAMING_TCP)
+            memory_port_bytes(&m, tcp, sizeof tcp);
+        else if (framing == MBM_FRAMING_ASCII)
+            memory_port_bytes(&m, (const uint8_t *)":07060007BEEF3F\r\n", 17);
+        else
+            memory_port_rtu(&m, reply, sizeof reply);
+        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        m.sent_count = 0;
+        works_over_the_new_link(framing);
     }
+}
+
+FRAMING_TEST(a_link_that_the_program_closes_while_it_is_being_made_sends_nothing_old)
+{
+    mbm_clientRequest second = {.unit = UNIT};
+
+    begin_in_flight(framing, NOTHING);
+    status_is = MBM_PENDING;
+    begin_link();
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_CONNECTING);
+    /* A queued request that the reconnection must leave as it is. */
+    IS(MBM_PENDING, mbm_client_readCoils(&client, &second, 0, 1));
+    OK(mbm_link_reconnect(&kept));
+    connects_with = MBM_PENDING;
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    IS(MBM_LINK_LOST, request.status);
+    IS(MBM_PENDING, second.status);
+    assert_int_equal(disconnects, 1);
+    OK(mbm_client_cancel(&client, &second));
+    status_is = MBM_OK;
+    IS(MBM_OK, mbm_client_poll(&client));
+    works_over_the_new_link(framing);
 }
 
 /* The link is lost, and its callback does this next. */
@@ -618,29 +592,28 @@ static void end_it(void *context, uint8_t event, uint8_t status)
         OK(mbm_link_end(&kept));
 }
 
-TEST(a_client_whose_link_ends_in_its_callback_sends_nothing_old)
+FRAMING_TEST(a_client_whose_link_ends_in_its_callback_sends_nothing_old)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned j = 1; j < COUNT(courses); j++) {
-            begin_in_flight(framings[i], NOTHING);
-            status_is = courses[j].status_is;
-            connects_with = courses[j].connects_with;
-            begin_link();
-            OK(mbm_link_setCallback(&kept, end_it, NULL));
-            (void)mbm_client_poll(&client);
-            status_is = MBM_LINK_LOST;
-            run(100);
-            assert_int_equal(mbm_link_state(&kept), 0);
-            accepts = ALL;
-            m.is_lost = 0;
-            run(100);
-            IS(MBM_LINK_LOST, request.status);
-            assert_int_equal(m.sent_count, 0);
-            queue_read(&other);
-            memory_port_send(&m, &client);
-            answer(framings[i]);
-            IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
-        }
+    for (unsigned j = 1; j < COUNT(courses); j++) {
+        begin_in_flight(framing, NOTHING);
+        status_is = courses[j].status_is;
+        connects_with = courses[j].connects_with;
+        begin_link();
+        OK(mbm_link_setCallback(&kept, end_it, NULL));
+        (void)mbm_client_poll(&client);
+        status_is = MBM_LINK_LOST;
+        run(100);
+        assert_int_equal(mbm_link_state(&kept), 0);
+        accepts = ALL;
+        m.is_lost = 0;
+        run(100);
+        IS(MBM_LINK_LOST, request.status);
+        assert_int_equal(m.sent_count, 0);
+        queue_read(&other);
+        memory_port_send(&m, &client);
+        answer(framing);
+        IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
+    }
 }
 
 /* A reply that guesses the transaction identifier ends a request before it was sent. */

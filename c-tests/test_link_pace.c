@@ -1,28 +1,26 @@
 /* A link that rests after it was opened, and one that is closed although it is good. */
 #include "linked.h"
 
-TEST(no_request_is_sent_before_the_delay_after_connecting_is_over)
+FRAMING_TEST(no_request_is_sent_before_the_delay_after_connecting_is_over)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i]);
-        OK(mbm_link_setDelayAfterConnect(&kept, 2000));
-        queue_read(&request);
-        IS(MBM_PENDING, mbm_client_poll(&client));
-        assert_string_equal(events, "C00 ");
-        run(1999);
-        assert_int_equal(m.sent_count, 0);
-        IS(MBM_PENDING, request.status);
-        run(10);
-        assert_true(m.sent_count > 0);
-        answer(framings[i]);
-        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-        /* Once it is over, it stays so, also when the clock wraps. */
-        m.now += 0xFFFFFFFFu - 1000000u;
-        m.sent_count = 0;
-        queue_read(&request);
-        memory_port_send(&m, &client);
-        assert_true(m.sent_count > 0);
-    }
+    begin(framing);
+    OK(mbm_link_setDelayAfterConnect(&kept, 2000));
+    queue_read(&request);
+    IS(MBM_PENDING, mbm_client_poll(&client));
+    assert_string_equal(events, "C00 ");
+    run(1999);
+    assert_int_equal(m.sent_count, 0);
+    IS(MBM_PENDING, request.status);
+    run(10);
+    assert_true(m.sent_count > 0);
+    answer(framing);
+    IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+    /* Once it is over, it stays so, also when the clock wraps. */
+    m.now += 0xFFFFFFFFu - 1000000u;
+    m.sent_count = 0;
+    queue_read(&request);
+    memory_port_send(&m, &client);
+    assert_true(m.sent_count > 0);
 }
 
 TEST(during_the_delay_the_client_sleeps_and_drops_what_arrives)
@@ -60,52 +58,48 @@ TEST(the_delay_is_0_to_65535)
     reads_right(MBM_FRAMING_TCP);
 }
 
-TEST(a_link_that_closes_when_idle_is_open_for_a_round)
+FRAMING_TEST(a_link_that_closes_when_idle_is_open_for_a_round)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_WHEN_IDLE));
-        for (unsigned round = 1; round < 4; round++) {
-            reads_right(framings[i]);
-            /* The next request of the round comes before the next poll. */
-            m.sent_count = 0;
-            reads_right(framings[i]);
-            m.sent_count = 0;
-            assert_int_equal(disconnects, round - 1);
-            OK(mbm_client_poll(&client));
-            assert_int_equal(disconnects, round);
-            assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
-            /* It stays closed, and the client sleeps. */
-            assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
-            run(100000);
-            assert_int_equal(connects, round);
-        }
-        assert_int_equal(counters.lost, 0);
-        assert_int_equal(counters.connected, 3);
-        assert_string_equal(events, "C00 C00 ");
+    begin_up(framing);
+    OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_WHEN_IDLE));
+    for (unsigned round = 1; round < 4; round++) {
+        reads_right(framing);
+        /* The next request of the round comes before the next poll. */
+        m.sent_count = 0;
+        reads_right(framing);
+        m.sent_count = 0;
+        assert_int_equal(disconnects, round - 1);
+        OK(mbm_client_poll(&client));
+        assert_int_equal(disconnects, round);
+        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+        /* It stays closed, and the client sleeps. */
+        assert_int_equal(mbm_client_pollDelay(&client), 1000 * MS);
+        run(100000);
+        assert_int_equal(connects, round);
     }
+    assert_int_equal(counters.lost, 0);
+    assert_int_equal(counters.connected, 3);
+    assert_string_equal(events, "C00 C00 ");
 }
 
-TEST(a_link_that_closes_after_a_failure_opens_for_the_next_request_at_once)
+FRAMING_TEST(a_link_that_closes_after_a_failure_opens_for_the_next_request_at_once)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin_up(framings[i]);
-        OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_AFTER_FAILURE));
-        reads_right(framings[i]);
-        assert_int_equal(disconnects, 0);
-        queue_read(&request);
-        IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 10000));
-        run(1);
-        assert_int_equal(disconnects, 1);
-        assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
-        run(100000);
-        assert_int_equal(connects, 1);
-        m.sent_count = 0;
-        reads_right(framings[i]);
-        assert_int_equal(connects, 2);
-        assert_int_equal(counters.lost, 0);
-        assert_string_equal(events, "C00 ");
-    }
+    begin_up(framing);
+    OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_AFTER_FAILURE));
+    reads_right(framing);
+    assert_int_equal(disconnects, 0);
+    queue_read(&request);
+    IS(MBM_RESPONSE_TIMED_OUT, memory_port_run(&m, &client, &request, 10000));
+    run(1);
+    assert_int_equal(disconnects, 1);
+    assert_int_equal(mbm_link_state(&kept), MBM_LINK_IS_DOWN);
+    run(100000);
+    assert_int_equal(connects, 1);
+    m.sent_count = 0;
+    reads_right(framing);
+    assert_int_equal(connects, 2);
+    assert_int_equal(counters.lost, 0);
+    assert_string_equal(events, "C00 ");
 }
 
 TEST(a_request_that_waits_is_sent_over_the_new_connection)

@@ -154,79 +154,74 @@ static int is_standard(uint8_t function)
     return memchr(codes, function, sizeof codes) != NULL;
 }
 
-TEST(every_function_may_be_answered_without_data)
+FRAMING_TEST(every_function_may_be_answered_without_data)
 {
     static const mbm_rule silence = MBM_INIT;
 
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned function = 1; function <= LAST; function++) {
-            begin(framings[i], "", 0);
-            IS(MBM_PENDING, mbm_client_custom(&client, &request, (uint8_t)function, 0, &silence));
-            IS(MBM_OK, run());
-            assert_int_equal(answer.calls, 1);
-            assert_int_equal(request.length, 0);
-            assert_int_equal(reply[0], 0xEE);
-            /* The silence that ends the frame was enough. */
-            assert_true(near_end.now < 600000);
-            if (!is_standard((uint8_t)function))
-                assert_seen(framings[i], (uint8_t)function);
-        }
-}
-
-TEST(every_function_that_the_standard_leaves_open_is_forwarded_without_data)
-{
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned function = 1; function <= LAST; function++) {
-            uint8_t queued;
-
-            begin(framings[i], "", 0);
-            queued = mbm_client_forward(&client, &request, (uint8_t)function, NULL, 0);
-            if (!is_standard((uint8_t)function)) {
-                IS(MBM_PENDING, queued);
-                IS(MBM_OK, run());
-                assert_int_equal(request.length, 0);
-                assert_seen(framings[i], (uint8_t)function);
-            } else if (queued == MBM_PENDING) {
-                /* 07, 0B, 0C and 11 (hex) have no data to send, and an answer with data. */
-                assert_true(run() >= 0xE0);
-            } else {
-                IS(MBM_ILLEGAL_DATA_VALUE, queued);
-            }
-            assert_int_equal(reply[0], 0xEE);
-        }
-}
-
-TEST(a_function_with_data_may_be_answered_without)
-{
-    static const mbm_rule silence = MBM_INIT;
-
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        begin(framings[i], "", 0);
-        request.data = "abcde";
-        IS(MBM_PENDING, mbm_client_custom(&client, &request, 0x42, 5, &silence));
+    for (unsigned function = 1; function <= LAST; function++) {
+        begin(framing, "", 0);
+        IS(MBM_PENDING, mbm_client_custom(&client, &request, (uint8_t)function, 0, &silence));
         IS(MBM_OK, run());
+        assert_int_equal(answer.calls, 1);
         assert_int_equal(request.length, 0);
-        begin(framings[i], "", 0);
-        IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x42, (const uint8_t *)"abcde", 5));
-        IS(MBM_OK, run());
-        assert_int_equal(request.length, 0);
+        assert_int_equal(reply[0], 0xEE);
+        /* The silence that ends the frame was enough. */
+        assert_true(near_end.now < 600000);
+        if (!is_standard((uint8_t)function))
+            assert_seen(framing, (uint8_t)function);
     }
 }
 
+FRAMING_TEST(every_function_that_the_standard_leaves_open_is_forwarded_without_data)
+{
+    for (unsigned function = 1; function <= LAST; function++) {
+        uint8_t queued;
+
+        begin(framing, "", 0);
+        queued = mbm_client_forward(&client, &request, (uint8_t)function, NULL, 0);
+        if (!is_standard((uint8_t)function)) {
+            IS(MBM_PENDING, queued);
+            IS(MBM_OK, run());
+            assert_int_equal(request.length, 0);
+            assert_seen(framing, (uint8_t)function);
+        } else if (queued == MBM_PENDING) {
+            /* 07, 0B, 0C and 11 (hex) have no data to send, and an answer with data. */
+            assert_true(run() >= 0xE0);
+        } else {
+            IS(MBM_ILLEGAL_DATA_VALUE, queued);
+        }
+        assert_int_equal(reply[0], 0xEE);
+    }
+}
+
+FRAMING_TEST(a_function_with_data_may_be_answered_without)
+{
+    static const mbm_rule silence = MBM_INIT;
+
+    begin(framing, "", 0);
+    request.data = "abcde";
+    IS(MBM_PENDING, mbm_client_custom(&client, &request, 0x42, 5, &silence));
+    IS(MBM_OK, run());
+    assert_int_equal(request.length, 0);
+    begin(framing, "", 0);
+    IS(MBM_PENDING, mbm_client_forward(&client, &request, 0x42, (const uint8_t *)"abcde", 5));
+    IS(MBM_OK, run());
+    assert_int_equal(request.length, 0);
+}
+
 /* MEI type and sub-function are no data: the response repeats them. */
-TEST(a_reply_that_lacks_what_it_must_repeat_is_not_accepted)
+FRAMING_TEST(a_reply_that_lacks_what_it_must_repeat_is_not_accepted)
 {
     static const char *const bodies[] = {"\x0D\x01", "\x00\x15\x00\x00"};
     static const uint8_t functions[] = {0x2B, 0x08}, counts[] = {2, 4};
 
-    for (unsigned i = 0; i < COUNT(framings); i++)
-        for (unsigned k = 0; k < COUNT(functions); k++) {
-            begin(framings[i], "", 0);
-            IS(MBM_PENDING, mbm_client_forward(&client, &request, functions[k],
-                                               (const uint8_t *)bodies[k], counts[k]));
-            assert_true(run() >= 0xE0);
-            assert_int_equal(request.length, 0);
-        }
+    for (unsigned k = 0; k < COUNT(functions); k++) {
+        begin(framing, "", 0);
+        IS(MBM_PENDING, mbm_client_forward(&client, &request, functions[k],
+                                           (const uint8_t *)bodies[k], counts[k]));
+        assert_true(run() >= 0xE0);
+        assert_int_equal(request.length, 0);
+    }
 }
 
 /* An answer whose bytes no function of the standard would have. */

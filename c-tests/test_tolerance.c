@@ -127,30 +127,28 @@ TEST(a_lenient_client_of_an_rtu_line_does_too_whatever_else_is_set)
         }
 }
 
-TEST(a_message_wait_passes_between_two_requests_in_each_framing)
+FRAMING_TEST(a_message_wait_passes_between_two_requests_in_each_framing)
 {
-    for (unsigned i = 0; i < COUNT(framings); i++) {
-        uint32_t end;
+    uint32_t end;
 
-        begin_up(framings[i]);
-        if (framings[i] == MBM_FRAMING_TCP)
-            OK(mbm_client_setInFlight(&client, 1));
-        OK(mbm_client_setBaudRate(&client, 9600));
-        OK(mbm_client_setMessageWait(&client, 50));
-        for (unsigned turn = 0; turn < 3; turn++) {
-            queue_read(&request);
-            m.sent_count = 0;
-            memory_port_send(&m, &client);
-            answer(framings[i]);
-            IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
-            end = m.now;
-            queue_read(&other);
-            m.sent_count = 0;
-            memory_port_send(&m, &client);
-            assert_in_range(m.now - end, 50 * MS, 51 * MS);
-            answer(framings[i]);
-            IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
-        }
+    begin_up(framing);
+    if (framing == MBM_FRAMING_TCP)
+        OK(mbm_client_setInFlight(&client, 1));
+    OK(mbm_client_setBaudRate(&client, 9600));
+    OK(mbm_client_setMessageWait(&client, 50));
+    for (unsigned turn = 0; turn < 3; turn++) {
+        queue_read(&request);
+        m.sent_count = 0;
+        memory_port_send(&m, &client);
+        answer(framing);
+        IS(MBM_OK, memory_port_run(&m, &client, &request, 1000));
+        end = m.now;
+        queue_read(&other);
+        m.sent_count = 0;
+        memory_port_send(&m, &client);
+        assert_in_range(m.now - end, 50 * MS, 51 * MS);
+        answer(framing);
+        IS(MBM_OK, memory_port_run(&m, &client, &other, 1000));
     }
 }
 

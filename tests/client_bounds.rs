@@ -76,7 +76,7 @@ proptest! {
                 Framing::Ascii => Serial::ascii(end.clone(), lent),
                 _ => Serial::new(end.clone(), lent),
             };
-            let settings = &mut line.engine.settings;
+            let settings = &mut line.settings;
             settings.echo_discard = echo;
             settings.response_timeout = MicrosSetting::new(200_000);
             let mut client: Client<_, _, 4> = Client::new(line);
@@ -106,7 +106,7 @@ proptest! {
                     prop_assert_eq!(task.received(), received);
                 }
                 // No held reply takes space in the frame buffer any more.
-                let whole = usize::from(client.line.engine.storage.frame.capacity());
+                let whole = usize::from(client.line.storage.frame.capacity());
                 prop_assert_eq!(whole, space.max(17));
             }
         }

@@ -60,7 +60,7 @@ fn a_read_takes_the_first_data_of_a_reply_with_too_many_after_the_silence() {
         (1, &[3, 2, 0, 5], &[0, 5]),
     ] {
         let (end, mut client) = client();
-        let counters = client.line.engine.storage.counters.clone();
+        let counters = client.line.storage.counters.clone();
         for _ in 0..3 {
             let (task, time) = ask(&end, &mut client, read(0, quantity), &frame(17, pdu));
             assert_eq!(task.state.status, Status::OK, "{pdu:02X?}");

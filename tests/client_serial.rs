@@ -366,7 +366,7 @@ fn a_request_longer_than_the_frame_buffer_has_no_exception_of_the_request_before
 /// reply looks like the reply to the next request.
 fn a_late_reply_is_passed_over(line: (End, Transport), encode: fn(u8, &[u8]) -> Vec<u8>) {
     let (end, mut client) = line;
-    client.line.engine.settings.response_timeout = MicrosSetting::new(500_000);
+    client.line.settings.response_timeout = MicrosSetting::new(500_000);
     let reply = |value: u8| encode(17, &[3, 2, 0, value]);
     assert!(client.queue(read(17, 1)).is_ok());
     assert_eq!(
@@ -400,7 +400,7 @@ fn a_late_reply_in_ascii_frames_is_not_the_answer_to_a_later_request() {
 /// ended task.
 fn ended_in_ascii(line: &[u8]) -> Task {
     let (end, mut client) = ascii_client();
-    client.line.engine.storage.frame = Frame::new(vec![0; 40]);
+    client.line.storage.frame = Frame::new(vec![0; 40]);
     let build: fn(&mut RequestState) -> Status =
         |o| o.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0);
     assert!(client.queue(Task::new(2, 1, &[], build)).is_ok());

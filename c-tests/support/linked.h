@@ -3,6 +3,7 @@
 #ifndef LINKED_H
 #define LINKED_H
 
+#include "every_call.h"
 #include "memory_port.h"
 #include "test.h"
 
@@ -71,17 +72,9 @@ static inline void begin_client(int framing)
 {
     const mbm_port port = memory_port_of(&m);
 
-    switch (framing) {
-    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
+    if (framing == MBM_FRAMING_TCP)
         OK(mbm_client_setInFlight(&client, MBM_CLIENT_DEPTH));
-        break;
-    }
     OK(mbm_client_setResponseTimeout(&client, 300));
     OK(mbm_client_setQuietTime(&client, 0));
 }
@@ -93,8 +86,7 @@ static inline void begin(int framing)
     memset(&client, 0, sizeof client);
     memset(&kept, 0, sizeof kept);
     memset(&counters, 0, sizeof counters);
-    memset(&request, 0, sizeof request);
-    memset(&other, 0, sizeof other);
+    request = other = (mbm_clientRequest){.unit = UNIT, .reply = words, .replyBytes = sizeof words};
     connects = disconnects = 0;
     connects_with = MBM_OK;
     status_is = MBM_LINK_LOST;
@@ -104,9 +96,6 @@ static inline void begin(int framing)
     OK(mbm_link_begin(&kept, &client, &hooks));
     OK(mbm_link_setCallback(&kept, changed, &kept));
     OK(mbm_link_setCounters(&kept, &counters));
-    request.unit = other.unit = UNIT;
-    request.reply = other.reply = words;
-    request.replyBytes = other.replyBytes = sizeof words;
 }
 
 static inline void begin_up(int framing)

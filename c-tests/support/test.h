@@ -43,6 +43,18 @@ void test_add(const char *name, void (*test)(void), void (*setup)(void), void (*
         call;                                                                                      \
     }
 
+/* A test that runs with each framing of the program's `framings`, or of its `streams`. */
+#define FRAMING_TEST(name) TEST_OF_EACH(framings, name)
+#define STREAM_TEST(name) TEST_OF_EACH(streams, name)
+#define TEST_OF_EACH(list, name)                                                                   \
+    static void with_##name(uint8_t framing);                                                      \
+    TEST(name)                                                                                     \
+    {                                                                                              \
+        for (size_t i = 0; i < COUNT(list); i++)                                                   \
+            with_##name((uint8_t)(list)[i]);                                                       \
+    }                                                                                              \
+    static void with_##name(uint8_t framing)
+
 /* Compares the status that a function of mbm.h returns. */
 #define IS(status, call) assert_int_equal(call, status)
 #define OK(call) IS(MBM_OK, call)

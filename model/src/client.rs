@@ -168,7 +168,7 @@ impl Device {
 pub fn play(schedule: Schedule, quiet_time: u32) -> Ended {
     let end = End::default();
     let mut line = Serial::new(end.clone(), Lent::default());
-    let settings = &mut line.engine.settings;
+    let settings = &mut line.settings;
     settings.gap = MicrosSetting::new(SILENCE);
     settings.silence = MicrosSetting::new(SILENCE);
     settings.response_timeout = MicrosSetting::new(TIMEOUT);

@@ -160,6 +160,11 @@ check-poll-page: tool ## Open the page of mbm poll --http in Chromium, as a desk
 	@scripts/venv $(BUILD)/venv-browser browser
 	@$(BUILD)/venv-browser/bin/python -B scripts/check/poll-page $(BUILD)/plain/mbm --screenshots
 
+.PHONY: check-home-assistant
+check-home-assistant: tool ## Give the messages of mbm bridge to the schemas of Home Assistant: PYTHON=one that has its package
+	@scripts/need mosquitto mosquitto-clients
+	@$(or $(PYTHON),python3) -B scripts/check/home-assistant $(BUILD)/plain/mbm
+
 .PHONY: check-docs-site
 check-docs-site: docs ## Open the site in Chromium: width of a phone, requests, search; pictures in build/screenshots
 	@scripts/need chromium

@@ -5,9 +5,9 @@ use super::call::{
     WriteRecords, CALL_BYTES,
 };
 use super::calls::calls;
-use super::serial::Serial;
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
+use super::transaction::Serial;
 use super::{Client, Policy, Transport};
 use crate::engine::{Frame, Settings};
 use crate::error::Error;

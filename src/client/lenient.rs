@@ -9,9 +9,8 @@
 //! contains none of this code.
 
 use super::request::ClientRequest;
-use super::serial::Serial;
 use super::storage::ClientStorage;
-use super::transaction::{ClientEngine, ClientTransaction};
+use super::transaction::{ClientTransaction, Serial};
 use crate::engine::{Extension, Finding, Moment};
 use crate::frame::rtu;
 use crate::port::Port;
@@ -25,13 +24,13 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
             true => Some(extend as Extension<P, S, ClientTransaction<P, S, J>>),
             false => None,
         };
-        self.engine.set_lenient(lenient);
+        self.set_lenience(lenient);
     }
 }
 
 /// See [`Extension`].
 fn extend<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut ClientEngine<P, S, J>,
+    engine: &mut Serial<P, S, J>,
     moment: Moment,
 ) -> bool {
     moment == Moment::Missed && accept_deviating(engine)
@@ -39,7 +38,7 @@ fn extend<P: Port, S: ClientStorage, J: ClientRequest>(
 
 /// Makes the deviating reply that ends with the last byte the result, if there is one.
 fn accept_deviating<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut ClientEngine<P, S, J>,
+    engine: &mut Serial<P, S, J>,
 ) -> bool {
     if !engine.awaits_reply() {
         return false;
@@ -68,7 +67,7 @@ fn accept_deviating<P: Port, S: ClientStorage, J: ClientRequest>(
 /// The length of the frame of a deviating reply that ends with the last byte, and how many bytes of
 /// unit and PDU count.
 fn find<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut ClientEngine<P, S, J>,
+    engine: &mut Serial<P, S, J>,
 ) -> Option<(u16, u16)> {
     let (unit, function) = (engine.unit, engine.function);
     let have = engine.end - engine.content;

@@ -31,11 +31,11 @@ pub use ready::Request;
 pub use request::{ClientRequest, Refused, RequestState};
 #[doc(hidden)]
 pub use serial::late_rest;
-pub use serial::Serial;
 pub use storage::{ClientStorage, TcpBuffers};
 pub use tcp::{Tcp, TolerantTcp, ACCEPT_TRANSACTION, ACCEPT_UNIT};
 #[doc(hidden)]
-pub use transaction::{ClientEngine, ClientTransaction};
+pub use transaction::ClientTransaction;
+pub use transaction::Serial;
 pub use units::UnitRecord;
 #[doc(hidden)]
 pub use units::{find, note, rest};

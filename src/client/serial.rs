@@ -4,31 +4,15 @@
 use super::queue::RequestQueue;
 use super::request::{is_answer, store_response, ClientRequest, RequestState, Stage};
 use super::storage::ClientStorage;
-use super::transaction::ClientEngine;
+use super::transaction::Serial;
 use super::Transport;
 use super::{Client, ASCII_SILENCE, STREAM_SILENCE};
-use crate::engine::{Engine, LateUnits, MicrosSetting, Settings};
+use crate::engine::{LateUnits, MicrosSetting, Settings};
 use crate::error::Status;
 use crate::frame::{ascii, rtu};
 use crate::port::Port;
 
-/// One request at a time, in RTU or ASCII frames.
-#[repr(C)]
-#[derive(Debug)]
-pub struct Serial<P, S: ClientStorage, J> {
-    /// The engine that sends the request and finds the reply.
-    #[doc(hidden)]
-    pub engine: ClientEngine<P, S, J>,
-}
-
 impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
-    /// A serial line with RTU frames.
-    pub const fn new(port: P, storage: S) -> Self {
-        Serial {
-            engine: Engine::new(port, storage),
-        }
-    }
-
     /// A serial line with ASCII frames.
     pub const fn ascii(port: P, storage: S) -> Self {
         let mut line = Serial::new(port, storage);
@@ -39,16 +23,16 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// Changes the line to ASCII frames: no silence before a request, and one second
     /// without a character ends an incomplete frame.
     pub const fn set_ascii(&mut self) {
-        self.engine.request().set_ascii(ascii::END);
-        self.engine.settings.gap = MicrosSetting::new(0);
-        self.engine.settings.silence = MicrosSetting::new(ASCII_SILENCE);
+        self.request().set_ascii(ascii::END);
+        self.settings.gap = MicrosSetting::new(0);
+        self.settings.silence = MicrosSetting::new(ASCII_SILENCE);
     }
 
     /// Changes the line to a TCP stream: no silence before a request, and
     /// [`STREAM_SILENCE`] ends a frame.
     pub const fn set_stream(&mut self) {
-        self.engine.settings.gap = MicrosSetting::new(0);
-        self.engine.settings.silence = MicrosSetting::new(STREAM_SILENCE);
+        self.settings.gap = MicrosSetting::new(0);
+        self.settings.silence = MicrosSetting::new(STREAM_SILENCE);
     }
 }
 
@@ -68,8 +52,8 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// the port, a program that sleeps until bytes arrive would wake up at once.
     #[cold]
     fn drop_late_bytes<const N: usize>(&mut self, queue: &mut RequestQueue<J, N>, now: u32) {
-        let is_rtu = !self.engine.request().is_ascii();
-        match self.engine.drop_received(now, is_rtu) {
+        let is_rtu = !self.request().is_ascii();
+        match self.drop_received(now, is_rtu) {
             0 => {}
             ..0 => queue.disconnect(),
             // A unit may owe nothing any more, so a request may be due.
@@ -78,24 +62,24 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     }
 
     /// Passes a request to the engine and starts it.
-    fn start(&mut self, request: J) -> Status {
+    fn start_request(&mut self, request: J) -> Status {
         let unit = request.state().unit();
         // A refused request begins no search, which would clear it.
-        self.engine.exception = 0;
-        self.engine.request().begin(request);
-        self.engine.start(unit)
+        self.exception = 0;
+        self.request().begin(request);
+        self.start(unit)
     }
 
     /// Stores the response in the request, and returns the status of the request.
     fn store_reply(&mut self, request: &mut J, status: Status) -> Status {
-        request.state_mut().exception = self.engine.exception_code();
+        request.state_mut().exception = self.exception_code();
         // The content is empty after a broadcast or another request that has no response.
-        let content = self.engine.content;
+        let content = self.content;
         if status != Status::OK || content == 0 {
             return status;
         }
         let pdu = rtu::PDU as u16;
-        store_response(request, self.engine.storage.slice(pdu, content - pdu))
+        store_response(request, self.storage.slice(pdu, content - pdu))
     }
 }
 
@@ -121,15 +105,15 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
     type Storage = S;
 
     fn settings(&mut self) -> &mut Settings {
-        &mut self.engine.settings
+        &mut self.settings
     }
 
     fn port(&mut self) -> &mut P {
-        &mut self.engine.port
+        &mut self.port
     }
 
     fn storage(&mut self) -> &mut S {
-        &mut self.engine.storage
+        &mut self.storage
     }
 
     fn advance<const N: usize>(
@@ -141,13 +125,13 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         // The engine has the request only during this call.
         let mut status = Status::PENDING;
         if let Some(request) = queue.active.take() {
-            self.engine.request().client_request = Some(request);
+            self.request().client_request = Some(request);
         } else {
-            let (late_units, settings) = (&mut self.engine.late_units, &self.engine.settings);
+            let (late_units, settings) = (&mut self.late_units, &self.settings);
             let rest = |state: &RequestState| late_rest(state, late_units, settings, now);
             let due = match queue.is_held {
                 true => None,
-                false => queue.take_due(now, &mut self.engine.storage, rest),
+                false => queue.take_due(now, &mut self.storage, rest),
             };
             let Some(request) = due else {
                 if fresh && !queue.queue.is_empty() {
@@ -156,14 +140,14 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
                 return None;
             };
             if request.state().is(Stage::Lost) {
-                return queue.conclude(request, Status::LINK_LOST, now, &mut self.engine.storage);
+                return queue.conclude(request, Status::LINK_LOST, now, &mut self.storage);
             }
-            status = self.start(request);
+            status = self.start_request(request);
         }
         if status == Status::PENDING {
-            status = self.engine.poll(now);
+            status = self.poll(now);
         }
-        let mut request = self.engine.request().client_request.take()?;
+        let mut request = self.request().client_request.take()?;
         if status == Status::PENDING {
             queue.active = Some(request);
             return None;
@@ -175,11 +159,11 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
             queue.note_answered(0);
         }
         // The queue has space: the active request has always counted as part of it.
-        queue.conclude(request, status, now, &mut self.engine.storage)
+        queue.conclude(request, status, now, &mut self.storage)
     }
 
     fn release(&mut self, request: Option<&J>) {
-        let engine = &mut self.engine;
+        let engine = self;
         let line = engine.settings.response_timeout;
         if let Some(request) = request {
             // The engine does not have the request now, so it takes the timeout of the line.
@@ -193,11 +177,11 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
     }
 
     fn forget_late_replies(&mut self) {
-        self.engine.forget_late_replies();
+        self.forget_late_replies();
     }
 
     fn delay(&mut self, now: u32) -> Option<u32> {
-        let is_pending = self.engine.is_pending();
-        is_pending.then(|| self.engine.poll_delay(now))
+        let is_pending = self.is_pending();
+        is_pending.then(|| self.poll_delay(now))
     }
 }

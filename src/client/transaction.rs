@@ -9,15 +9,15 @@ use crate::pdu::MAX_PDU;
 use crate::port::Port;
 use core::num::NonZeroU8;
 
-/// The engine of a client on a serial line.
-pub type ClientEngine<P, S, J> = Engine<P, S, ClientTransaction<P, S, J>>;
+/// A client's serial line: the engine, which has one request at a time, in RTU or ASCII frames.
+pub type Serial<P, S, J> = Engine<P, S, ClientTransaction<P, S, J>>;
 
 /// The functions that write and find ASCII frames. (Pointers, so that firmware without an
 /// ASCII line does not contain them.)
 #[derive(Debug)]
 struct Ascii<P, S: ClientStorage, J> {
-    encode: fn(&mut ClientEngine<P, S, J>, content: u16),
-    search: fn(&mut ClientEngine<P, S, J>, received: u16) -> bool,
+    encode: fn(&mut Serial<P, S, J>, content: u16),
+    search: fn(&mut Serial<P, S, J>, received: u16) -> bool,
 }
 
 /// The request in flight.
@@ -98,7 +98,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         self.state().is_some_and(RequestState::returns_query_data)
     }
 
-    fn response_timeout(engine: &ClientEngine<P, S, J>) -> u32 {
+    fn response_timeout(engine: &Serial<P, S, J>) -> u32 {
         let line = engine.settings.response_timeout.get();
         match &engine.request.client_request {
             Some(request) => request.state().response_timeout(&engine.storage, line),
@@ -115,7 +115,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         frame <= space
     }
 
-    fn write(engine: &mut ClientEngine<P, S, J>) {
+    fn write(engine: &mut Serial<P, S, J>) {
         write(engine);
     }
 
@@ -128,7 +128,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         }
     }
 
-    fn is_reply(engine: &ClientEngine<P, S, J>, front: u16, length: u16) -> bool {
+    fn is_reply(engine: &Serial<P, S, J>, front: u16, length: u16) -> bool {
         let whole = length - rtu::OVERHEAD as u16;
         let pdu = engine.storage.slice(front + rtu::PDU as u16, whole);
         let Some(client_request) = &engine.request.client_request else {
@@ -138,7 +138,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         state.validate(pdu, data_of(client_request)) != Status::MALFORMED_REPLY
     }
 
-    fn is_echo(engine: &ClientEngine<P, S, J>, front: u16) -> bool {
+    fn is_echo(engine: &Serial<P, S, J>, front: u16) -> bool {
         let Some(state) = engine.request.state() else {
             return false;
         };
@@ -146,7 +146,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         state.matches_echo(engine.storage.slice(front + rtu::PDU as u16, length))
     }
 
-    fn find_ending_reply(engine: &mut ClientEngine<P, S, J>, is_silent: bool) -> u16
+    fn find_ending_reply(engine: &mut Serial<P, S, J>, is_silent: bool) -> u16
     where
         P: Port,
     {
@@ -163,7 +163,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
         0
     }
 
-    fn search(engine: &mut ClientEngine<P, S, J>, first: u16, received: u16) -> bool
+    fn search(engine: &mut Serial<P, S, J>, first: u16, received: u16) -> bool
     where
         P: Port,
     {
@@ -174,7 +174,7 @@ impl<P, S: ClientStorage, J: ClientRequest> Transaction<P, S> for ClientTransact
     }
 }
 
-impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
+impl<P, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
     /// True if the last `length` bytes may be the frame of the reply, as far as their first bytes
     /// tell its length.
     fn would_end(&self, length: u16, is_silent: bool) -> bool {
@@ -196,7 +196,7 @@ impl<P, S: ClientStorage, J: ClientRequest> ClientEngine<P, S, J> {
 }
 
 /// Writes the frame of the request.
-fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, J>) {
+fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut Serial<P, S, J>) {
     let length = u16::from(engine.request.request_length());
     engine.storage.set_byte(0, engine.unit);
     engine.request.emit(engine.storage.bytes(1, length));
@@ -208,7 +208,7 @@ fn write<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, 
 }
 
 /// Converts unit and PDU at the front of the frame buffer into an ASCII frame.
-fn encode<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S, J>, content: u16) {
+fn encode<P, S: ClientStorage, J: ClientRequest>(engine: &mut Serial<P, S, J>, content: u16) {
     let space = engine.storage.capacity();
     let frame = engine.storage.bytes(0, space);
     // The frame fits: `fits` was checked when the request was started.
@@ -217,7 +217,7 @@ fn encode<P, S: ClientStorage, J: ClientRequest>(engine: &mut ClientEngine<P, S,
 }
 
 fn search_ascii<P: Port, S: ClientStorage, J: ClientRequest>(
-    engine: &mut ClientEngine<P, S, J>,
+    engine: &mut Serial<P, S, J>,
     received: u16,
 ) -> bool {
     engine.search_ascii(received, engine.request.delimiter)

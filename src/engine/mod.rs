@@ -218,7 +218,7 @@ impl<P, S: Storage, Q> Engine<P, S, Q> {
 
     /// Sets what [`Engine::lenient`] returns, for later requests. Call it only while no request
     /// is pending.
-    pub fn set_lenient(&mut self, lenient: Option<Extension<P, S, Q>>) {
+    pub fn set_lenience(&mut self, lenient: Option<Extension<P, S, Q>>) {
         self.lenient = lenient;
     }
 }

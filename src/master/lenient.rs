@@ -24,7 +24,7 @@ const BEFORE_DATA: u8 = 3;
 const LEFT_FREE: u8 = 8;
 
 impl<P: Port, S: Words> Engine<P, S, MasterRequest> {
-    /// The argument for [`Engine::set_lenient`]: deviating replies are accepted if `on`. A read
+    /// The argument for [`Engine::set_lenience`]: deviating replies are accepted if `on`. A read
     /// may then be sent to unit 0, which has to reply.
     pub const fn lenient(on: bool) -> Option<Extension<P, S, MasterRequest>> {
         if on {

@@ -170,7 +170,7 @@ impl<P: Port, S: Words> Master<P, S> {
     /// has the right unit, function and CRC, and repeats another address, value or quantity, or has
     /// more or fewer data than were requested. Call it only while no request is pending.
     pub fn set_lenient(&mut self, on: bool) {
-        self.line.set_lenient(Line::<P, S>::lenient(on));
+        self.line.set_lenience(Line::<P, S>::lenient(on));
     }
 
     /// Cancels the pending request, if there is one. Its status becomes

@@ -220,7 +220,7 @@ impl<L: Transport<Task>> Requester<L> {
 }
 
 fn serial(mut line: Serial<Wire, Lent, Task>) -> Requester<Serial<Wire, Lent, Task>> {
-    line.engine.settings.response_timeout = MicrosSetting::new(TIMEOUT);
+    line.settings.response_timeout = MicrosSetting::new(TIMEOUT);
     Requester::new(line)
 }
 
@@ -246,6 +246,6 @@ fn the_client_reads_every_response_of_a_pymodbus_server_over_rtu_in_tcp() {
     let wire = Wire::new(Framing::RtuOverTcp);
     let mut client: Client<Serial<Wire, Lent, Task>, Task, 4> =
         Client::over_tcp(wire, Lent::default());
-    client.line.engine.settings.response_timeout = MicrosSetting::new(TIMEOUT);
+    client.line.settings.response_timeout = MicrosSetting::new(TIMEOUT);
     Requester::with(client).check_every_function();
 }

@@ -88,6 +88,9 @@ def test_home_assistant_takes_each_field_of_each_file(plain, folder, file):
     with open(file, encoding="utf-8") as lines:
         count = sum(line.startswith(("  - name:", "- name:", "  - {name:", "- {name:")) for line in lines)
     assert wait(lambda: len(messages(broker.retained())) >= count)
+    if re.search("eastron|em340|energy-meter", file):
+        counters = [config for _, config in messages(broker.retained()).values() if config.get("state_class") == "total_increasing"]
+        assert {(config["device_class"], config["unit_of_measurement"]) for config in counters} == {("energy", "kWh")}
 
 
 # --- what is refused

@@ -117,8 +117,9 @@ pub unsafe extern "C" fn mbm_client_setDelimiter(client: *mut mbm_client, charac
         if !queue(object).is_idle() {
             return Status::BUSY;
         }
-        let engine = &mut transport::<SerialTransport>(object).engine;
-        engine.request().set_ascii(character);
+        transport::<SerialTransport>(object)
+            .request()
+            .set_ascii(character);
         Status::OK
     })
 }

@@ -4,11 +4,9 @@
 use super::object::{transport, Object, SerialTransport, TcpTransport};
 use super::object::{TolerantTransport, TransportKind};
 use super::request::RequestPtr;
-use super::storage::ClientBuffers;
 use crate::framing::{MBM_FRAMING_ASCII, MBM_FRAMING_RTU, MBM_FRAMING_TCP};
-use crate::port::mbm_port;
 use core::mem::offset_of;
-use mbm::client::{ClientEngine, Transport};
+use mbm::client::Transport;
 
 const TRANSPORT: usize = offset_of!(Object, transport);
 
@@ -18,16 +16,14 @@ const fn serial(
     framing: u8,
     min_frame_bytes: u8,
 ) -> TransportKind {
-    type Engine = ClientEngine<mbm_port, ClientBuffers, RequestPtr>;
-    let engine = TRANSPORT + offset_of!(SerialTransport, engine);
     TransportKind {
         advance: advance::<SerialTransport>,
         release,
         start,
-        port: (engine + offset_of!(Engine, port)) as u16,
-        settings: (engine + offset_of!(Engine, settings)) as u16,
-        storage: (engine + offset_of!(Engine, storage)) as u16,
-        late_units: (engine + offset_of!(Engine, late_units)) as u16,
+        port: (TRANSPORT + offset_of!(SerialTransport, port)) as u16,
+        settings: (TRANSPORT + offset_of!(SerialTransport, settings)) as u16,
+        storage: (TRANSPORT + offset_of!(SerialTransport, storage)) as u16,
+        late_units: (TRANSPORT + offset_of!(SerialTransport, late_units)) as u16,
         min_frame_bytes,
         framing,
     }
@@ -88,13 +84,13 @@ unsafe fn release_stream(object: *mut Object, request: Option<&RequestPtr>) {
 
 unsafe fn start_rtu(object: *mut Object) {
     (*object).queue.has_broadcast = true;
-    transport::<SerialTransport>(object).engine.line_used();
+    transport::<SerialTransport>(object).line_used();
 }
 
 unsafe fn start_stream(object: *mut Object) {
     let transport = transport::<SerialTransport>(object);
     transport.set_stream();
-    transport.engine.line_used();
+    transport.line_used();
 }
 
 unsafe fn start_ascii(object: *mut Object) {

@@ -6,7 +6,7 @@ use super::object::{
 use super::request::{mbm_clientRequest, RequestPtr};
 use super::MBM_CLIENT_DEPTH;
 use crate::{pointers, port};
-use mbm::client::{late_rest, ClientRequest as _, RequestState, Transport as _};
+use mbm::client::{late_rest, ClientRequest as _, RequestState, Transport};
 use mbm::engine::LateUnits;
 use mbm::error::Status;
 
@@ -107,8 +107,7 @@ pub unsafe extern "C" fn mbm_client_pollDelay(client: *mut mbm_client) -> u32 {
         Status::OK => pointers::with_hooks(client, || {
             let object = pointers::object(client);
             let now = now(object);
-            let delay =
-                on_transport!(object, transport => transport.poll_delay(&(*object).queue, now));
+            let delay = on_transport!(object, transport => Transport::poll_delay(transport, &(*object).queue, now));
             if !(*object).linked {
                 return delay;
             }

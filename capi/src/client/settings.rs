@@ -37,7 +37,7 @@ unsafe fn set_extra(client: *mut mbm_client, change: impl FnOnce(&mut Settings))
         let kind = &*(*object).kind;
         change(kind.settings(object));
         if kind.framing != MBM_FRAMING_TCP {
-            transport::<SerialTransport>(object).engine.use_extras();
+            transport::<SerialTransport>(object).use_extras();
         }
     })
 }
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn mbm_client_setCounters(
         let kind = &*(*object).kind;
         kind.storage(object).counters = counters;
         if kind.framing != MBM_FRAMING_TCP {
-            transport::<SerialTransport>(object).engine.set_counting();
+            transport::<SerialTransport>(object).set_counting();
         }
     })
 }

@@ -255,7 +255,7 @@ unsafe fn take_line(node: *mut mbm_node) -> Status {
         }
         if status == Status::OK {
             line.storage.words = &raw mut (*object).words;
-            line.set_lenient((*object).lenient);
+            line.set_lenience((*object).lenient);
         }
     }
     status
