@@ -356,18 +356,18 @@ TEST(packets_without_records_or_objects_have_none)
 
     memset(&record, 0x77, sizeof record);
     memset(&object, 0x77, sizeof object);
-#define NONE(unchanged, which, ...) REFUSED(0, unchanged, mbm_packet_next##which(__VA_ARGS__))
-    NONE(record, Record, &packet, &cursor, &record);
-    NONE(object, Object, &packet, &cursor, &object);
-    NONE(record, Record, NULL, &cursor, &record);
-    NONE(object, Object, NULL, &cursor, &object);
-    NONE(record, Record, &packet, NULL, &record);
-    NONE(object, Object, &packet, NULL, &object);
-    NONE(cursor, Record, &packet, &cursor, NULL);
-    NONE(cursor, Object, &packet, &cursor, NULL);
+#define NONE(unchanged, next, ...) REFUSED(0, unchanged, next(__VA_ARGS__))
+    NONE(record, mbm_packet_nextRecord, &packet, &cursor, &record);
+    NONE(object, mbm_packet_nextObject, &packet, &cursor, &object);
+    NONE(record, mbm_packet_nextRecord, NULL, &cursor, &record);
+    NONE(object, mbm_packet_nextObject, NULL, &cursor, &object);
+    NONE(record, mbm_packet_nextRecord, &packet, NULL, &record);
+    NONE(object, mbm_packet_nextObject, &packet, NULL, &object);
+    NONE(cursor, mbm_packet_nextRecord, &packet, &cursor, NULL);
+    NONE(cursor, mbm_packet_nextObject, &packet, &cursor, NULL);
     assert_int_equal(cursor, 5);
     cursor = 0;
-    NONE(cursor, Record, &read_file, &cursor, NULL);
+    NONE(cursor, mbm_packet_nextRecord, &read_file, &cursor, NULL);
     REFUSED(1, read_file, mbm_packet_nextRecord(&read_file, &cursor, &record));
     INVALID(read_file, mbm_packet_addRecord(&read_file, NULL, 8, &record));
     INVALID(read_file, mbm_packet_addObject(&read_file, storage, 8, &object));
