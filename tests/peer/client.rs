@@ -22,14 +22,14 @@ use task::{Lent, Task};
 const TIMEOUT: u32 = 10_000_000;
 
 /// A port on the line to the pymodbus server.
-struct Wire {
+pub struct Wire {
     server: LiveServer,
     pending: VecDeque<u8>,
     begun: Instant,
 }
 
 impl Wire {
-    fn new(framing: Framing) -> Wire {
+    pub fn new(framing: Framing) -> Wire {
         Wire {
             server: LiveServer::new(framing),
             pending: VecDeque::new(),
@@ -59,6 +59,10 @@ impl Port for Wire {
 
     fn micros(&mut self) -> u32 {
         self.begun.elapsed().as_micros() as u32
+    }
+
+    fn idle(&mut self, micros: u32) {
+        std::thread::sleep(Duration::from_micros(micros.min(1000).into()));
     }
 }
 

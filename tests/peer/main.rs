@@ -7,6 +7,8 @@
 #![cfg_attr(not(feature = "pymodbus"), allow(dead_code))]
 
 #[cfg(feature = "pymodbus")]
+mod blocking;
+#[cfg(feature = "pymodbus")]
 mod client;
 #[cfg(feature = "pymodbus")]
 mod live_server;
