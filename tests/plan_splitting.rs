@@ -216,6 +216,35 @@ fn one_missing_register_between_fields_leaves_two_reads() {
 }
 
 #[test]
+fn each_of_600_coils_is_read_although_the_device_ignores_reads_of_more_than_400() {
+    let mut fields = registers((0..600).filter(|address| *address != 300));
+    for field in &mut fields {
+        field.table = COILS;
+        field.value_type = BIT;
+    }
+    let limits = Limits {
+        bit_gap: 1,
+        ..LIMITS
+    };
+    let mut world = World::new(fields, &limits, usize::MAX, SPARE);
+    let lacking = Device {
+        holes: [(COILS, 300)].into(),
+        most: 2000,
+        is_mute: false,
+    };
+    world.run(&lacking, 900);
+    is_found(&world, &lacking);
+    // Later it answers reads of each side, and nothing if both are read at once.
+    let silent = Device {
+        most: 400,
+        is_mute: true,
+        ..Device::default()
+    };
+    world.run(&silent, 200_000);
+    is_found(&world, &silent);
+}
+
+#[test]
 fn a_device_that_refuses_long_reads_is_read_in_parts_after_one_union_was_tried() {
     let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
     let device = Device {

@@ -160,12 +160,13 @@ impl Splitter<'_> {
     ) -> bool {
         let mut is_done = true;
         while let Some(left) = self.read_at(place) {
-            let seam = self.places(left).1;
+            let (first, seam) = self.places(left);
             let Some(right) = self.read_at(seam).filter(|_| seam < end) else {
                 break;
             };
             place = seam;
-            if self.is_apart(right) {
+            // Of more than 256 places the lowest byte does not tell which one is the seam.
+            if self.is_apart(right) || self.places(right).1 - first > 256 {
                 continue;
             }
             if self.are_queued(left, right) {
