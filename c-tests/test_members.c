@@ -14,28 +14,28 @@ static mbm_line line;
 static mbm_node n;
 static uint16_t response[WORDS], transmit[WORDS];
 static uint8_t frame[MBM_FRAME_BYTES(WORDS)];
-static unsigned idles, pres, posts;
+static unsigned idle_calls, pre_calls, post_calls;
 
 static void count_idle(void)
 {
-    idles++;
+    idle_calls++;
 }
 
 static void count_pre(void)
 {
-    assert_int_equal(pres, posts);
-    pres++;
+    assert_int_equal(pre_calls, post_calls);
+    pre_calls++;
 }
 
 static void count_post(void)
 {
-    posts++;
-    assert_int_equal(pres, posts);
+    post_calls++;
+    assert_int_equal(pre_calls, post_calls);
 }
 
 static void setup(void)
 {
-    idles = pres = posts = 0;
+    idle_calls = pre_calls = post_calls = 0;
     memset(&tty, 0, sizeof tty);
     memset(&callbacks, 0, sizeof callbacks);
     memset(&line, 0, sizeof line);
@@ -73,9 +73,9 @@ TEST(basic_writes_two_words_and_reads_six)
     OK(mbm_node_readHoldingRegisters(&n, 2, 6));
     for (uint8_t i = 0; i < 6; i++)
         assert_int_equal(mbm_node_getResponseBuffer(&n, i), server_pattern(2u + i));
-    assert_int_equal(pres, 2);
-    assert_int_equal(posts, 2);
-    assert_true(idles > 0);
+    assert_int_equal(pre_calls, 2);
+    assert_int_equal(post_calls, 2);
+    assert_true(idle_calls > 0);
 }
 
 /* The example PhoenixContact_nanoLC: bits 16 to a word, and an address that the device lacks. */
