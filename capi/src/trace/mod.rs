@@ -147,7 +147,7 @@ unsafe fn begin(
 ) -> Result<(), Error> {
     let (described, kind) = described(framing)?;
     let sends = side(sends)?;
-    let port = port.value().ok_or(Error::InvalidArgument)?;
+    let port = port.get()?;
     // A trace that passes its own bytes on to itself would never end.
     let is_own = port.context == trace.cast();
     if !port.is_complete() || trace.is_null() || buffer.is_null() || hook.is_none() || is_own {
@@ -184,7 +184,7 @@ unsafe fn begin(
             postTransmission: Some(post_transmission),
             idle: port.idle.map(|_| idle as _),
         },
-        inner: *port,
+        inner: port,
         core: Trace::new(passed_on, kind, sends, described.end(), buffer, observer),
     });
     Ok(())
