@@ -109,8 +109,13 @@ static size_t least_of(size_t a, size_t b, size_t c)
     return less < c ? less : c;
 }
 
-/* How many letters must be written, left out or changed to make one word of the other. A capital is
- * no other letter. */
+/* A capital is the same letter. */
+static int is_same_letter(char one, char other)
+{
+    return tolower((unsigned char)one) == tolower((unsigned char)other);
+}
+
+/* How many letters must be written, left out or changed to make one word of the other. */
 static size_t distance(const char *one, const char *other)
 {
     size_t row[LONGEST_WORD + 1], i, j;
@@ -126,10 +131,9 @@ static size_t distance(const char *one, const char *other)
         row[0] = i;
         for (j = 1; j <= columns; j++) {
             const size_t above = row[j];
-            const int is_other =
-                tolower((unsigned char)one[i - 1]) != tolower((unsigned char)other[j - 1]);
+            const size_t changed = is_same_letter(one[i - 1], other[j - 1]) ? 0 : 1;
 
-            row[j] = least_of(above + 1, row[j - 1] + 1, diagonal + (size_t)is_other);
+            row[j] = least_of(above + 1, row[j - 1] + 1, diagonal + changed);
             diagonal = above;
         }
     }
