@@ -41,8 +41,8 @@ fn main() -> Result<(), Error> {
     let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
     let mut master = Master::new(17, Line::default(), buffers);
     master.settings().set_baud_rate(19200);
-    master.read_holding_registers(2, 1)?;
-    master.wait(|| {})?;
-    println!("register 2: {:#06x}", master.response()[0]);
+    let mut words = [0];
+    master.read_holding_registers(2, &mut words)?;
+    println!("register 2: {:#06x}", words[0]);
     Ok(())
 }
