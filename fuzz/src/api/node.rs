@@ -173,7 +173,7 @@ fn poll(w: &World, node: *mut mbm_node) {
 
 fn words(w: &World, node: *mut mbm_node) {
     let (byte, word) = (w.byte(), w.word());
-    match w.byte() % 13 {
+    match w.byte() % 14 {
         0 => drop(call!(w, mbm_node_beginTransmission(node, word))),
         1 => {
             for _ in 0..byte % 130 {
@@ -206,6 +206,14 @@ fn words(w: &World, node: *mut mbm_node) {
                 3 => call!(w, mbm_node_send8(node, byte)),
                 _ => call!(w, mbm_node_send32(node, long)),
             });
+        }
+        12 => {
+            let count = call!(w, mbm_node_requestFrom(node, word, u16::from(byte)));
+            let line = span(w.line_of(node)).0;
+            assert!(
+                count <= 125 && (count == 0 || !w.is_locked(line)),
+                "{count} words to receive of a request"
+            );
         }
         _ => drop(call!(w, mbm_node_getExceptionCode(node))),
     }
