@@ -3,8 +3,6 @@
 #include "every_call.h"
 #include "linked.h"
 
-static const uint8_t streams[] = {MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
-
 /* A link that has been open for two seconds, over which one request was answered. */
 static void begin_good(int framing)
 {

@@ -18,25 +18,25 @@ static uint8_t connect_peer(void *context)
 static const mbm_linkHooks peer_hooks = {
     .context = &m, .disconnect = disconnect, .connect = connect_peer};
 
-/* A client, with a link or without, of a peer that says these bytes. */
-static void begin_peer(int framing, int has_link, const uint8_t *bytes, size_t count, size_t piece)
+/* A client, with a link or without, of a peer that says this. */
+static void begin_peer(int framing, int has_link, const talk *says, size_t piece)
 {
-    const mbm_port port = talker_begin(&peer, bytes, count, piece, &m.now);
+    const mbm_port port = talker_begin(&peer, says, piece, &m.now);
 
     begin(framing);
     memset(&client, 0, sizeof client);
-    switch (framing) {
-    case MBM_FRAMING_RTU: OK(mbm_client_beginRtu(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_ASCII: OK(mbm_client_beginAscii(&client, &port, frame, sizeof frame)); break;
-    case MBM_FRAMING_RTU_OVER_TCP:
-        OK(mbm_client_beginRtuOverTcp(&client, &port, frame, sizeof frame));
-        break;
-    default:
-        OK(mbm_client_beginTcp(&client, &port, frame, sizeof frame, outgoing, sizeof outgoing));
-    }
+    OK(CLIENT_BEGIN(&client, framing, &port, frame, outgoing));
     OK(mbm_client_setResponseTimeout(&client, 300));
     if (has_link)
         OK(mbm_link_begin(&kept, &client, &peer_hooks));
+}
+
+static void poll(void)
+{
+    talker_poll_begins(&peer);
+    (void)mbm_client_poll(&client);
+    talker_poll_ends(&peer);
+    m.now += MS;
 }
 
 /* Polls, each millisecond, until the request has ended. Returns how many milliseconds that took. */
@@ -44,182 +44,176 @@ static unsigned until_end(const mbm_clientRequest *which)
 {
     unsigned steps = 0;
 
-    while (which->status == MBM_PENDING && steps < STEPS) {
-        talker_poll_begins(&peer);
-        (void)mbm_client_poll(&client);
-        talker_poll_ends(&peer);
-        steps++;
-        m.now += MS;
-    }
+    for (; which->status == MBM_PENDING && steps < STEPS; steps++)
+        poll();
     assert_true(steps < STEPS);
     return steps;
 }
 
 /* --- connections that are closed again --- */
 
-static const uint8_t streams[] = {MBM_FRAMING_TCP, MBM_FRAMING_RTU_OVER_TCP};
 /* A serial device server that another master uses: ser2net and others say so, and close the
  * connection. */
-static const char in_use[] = "Port already in use\r\n";
+static const talk in_use = {"a text", BYTES("Port already in use\r\n")};
 
 static void begin_in_use(int framing)
 {
-    begin_peer(framing, 1, (const uint8_t *)in_use, sizeof in_use - 1, 100);
-    peer.each = sizeof in_use - 1;
+    begin_peer(framing, 1, &in_use, 100);
+    peer.each = in_use.count;
 }
 
-TEST(a_peer_that_sends_a_text_and_closes_each_connection_fails_the_request)
+STREAM_TEST(a_peer_that_sends_a_text_and_closes_each_connection_fails_the_request)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_in_use(streams[i]);
-        for (unsigned round = 0; round < 5; round++) {
-            const unsigned before = connects;
+    begin_in_use(framing);
+    for (unsigned round = 0; round < 5; round++) {
+        const unsigned before = connects;
 
-            queue_read(&request);
-            assert_in_range(until_end(&request), 1, 20);
-            IS(MBM_LINK_LOST, request.status);
-            assert_in_range(connects - before, 0, 2);
-        }
-        /* The attempts after that have their waits. */
-        run(5000);
-        assert_in_range(connects, 2, 20);
-        assert_int_equal(peer.sent, 0);
-    }
-}
-
-TEST(a_peer_that_closes_each_connection_during_the_delay_after_it_fails_the_request)
-{
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_in_use(streams[i]);
-        OK(mbm_link_setDelayAfterConnect(&kept, 2000));
         queue_read(&request);
         assert_in_range(until_end(&request), 1, 20);
         IS(MBM_LINK_LOST, request.status);
-        assert_in_range(connects, 1, 3);
-        /* Once the device is free, requests are sent again. */
-        peer.each = 0;
-        peer.piece = 0;
-        run(4000);
-        queue_read(&request);
-        assert_in_range(until_end(&request), 250, 400);
-        IS(MBM_RESPONSE_TIMED_OUT, request.status);
-        assert_true(peer.sent > 0);
+        assert_in_range(connects - before, 0, 2);
     }
+    /* The attempts after that have their waits. */
+    run(5000);
+    assert_in_range(connects, 2, 20);
+    assert_int_equal(peer.sent, 0);
 }
 
-TEST(requests_that_wait_for_the_link_make_no_loop_of_connections_that_are_closed)
+STREAM_TEST(a_peer_that_closes_each_connection_during_the_delay_after_it_fails_the_request)
 {
-    for (unsigned i = 0; i < COUNT(streams); i++) {
-        begin_in_use(streams[i]);
-        OK(mbm_link_setRequestsWait(&kept, 1));
-        queue_read(&request);
-        run(5000);
-        IS(MBM_PENDING, request.status);
-        /* Two each half second: that of the wait, and the one that the request opens. */
-        assert_in_range(connects, 5, 25);
-    }
+    begin_in_use(framing);
+    OK(mbm_link_setDelayAfterConnect(&kept, 2000));
+    queue_read(&request);
+    assert_in_range(until_end(&request), 1, 20);
+    IS(MBM_LINK_LOST, request.status);
+    assert_in_range(connects, 1, 3);
+    /* Once the device is free, requests are sent again. */
+    peer.each = 0;
+    peer.piece = 0;
+    run(4000);
+    queue_read(&request);
+    assert_in_range(until_end(&request), 250, 400);
+    IS(MBM_RESPONSE_TIMED_OUT, request.status);
+    assert_true(peer.sent > 0);
+}
+
+STREAM_TEST(requests_that_wait_for_the_link_make_no_loop_of_connections_that_are_closed)
+{
+    begin_in_use(framing);
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    queue_read(&request);
+    run(5000);
+    IS(MBM_PENDING, request.status);
+    /* Two each half second: that of the wait, and the one that the request opens. */
+    assert_in_range(connects, 5, 25);
 }
 
 /* --- bytes that keep coming --- */
 
-/* What the reads of a poll may take: those of a deadline are 255 for each request. */
+/* A poll may make 255 reads for each request whose deadline has passed. */
 enum { MOST_READS = 600, MOST_MS = 3000 };
 
-static void request_ends(const talk *t, int framing, int has_link, size_t piece)
+/* Whether four requests, one after the other, end in time. */
+static int requests_end(unsigned most_ms)
 {
-    begin_peer(framing, has_link, t->bytes, t->count, piece);
     for (unsigned round = 0; round < 4; round++) {
         queue_read(&request);
-        if (until_end(&request) > MOST_MS || peer.most_reads > MOST_READS)
-            fail_msg("%s, framing %d, link %d, %zu bytes a read", t->what, framing, has_link,
-                     piece);
+        if (until_end(&request) > most_ms || peer.most_reads > MOST_READS)
+            return 0;
     }
+    return 1;
 }
 
-TEST(a_request_ends_whatever_arrives_without_a_pause)
+FRAMING_TEST(a_request_ends_whatever_arrives_without_a_pause)
 {
     static const size_t pieces[] = {1, 7, 1000};
 
     for (unsigned i = 0; i < COUNT(TALKS); i++)
-        for (unsigned f = 0; f < COUNT(framings); f++)
-            for (unsigned p = 0; p < COUNT(pieces); p++)
-                for (int link = 0; link <= 1; link++)
-                    request_ends(&TALKS[i], framings[f], link, pieces[p]);
+        for (unsigned p = 0; p < COUNT(pieces); p++)
+            for (int link = 0; link <= 1; link++) {
+                begin_peer(framing, link, &TALKS[i], pieces[p]);
+                if (!requests_end(MOST_MS))
+                    fail_msg("%s, framing %d, link %d, %zu bytes a read", TALKS[i].what, framing,
+                             link, pieces[p]);
+            }
 }
 
-/* With settings that wait for the device, too. */
+/* The settings that wait for the device, too. Only those from LENIENT on are for all framings, and
+ * LENIENT itself is not for ASCII. */
+enum {
+    ACCEPT_UNIT,
+    ACCEPT_TRANSACTION,
+    MESSAGE_WAIT,
+    LENIENT,
+    RETRIES,
+    QUIET_TIME,
+    DELAY_AFTER_CONNECT, /* of a link, like those below */
+    CLOSE_AFTER_FAILURE,
+    CLOSE_WHEN_IDLE,
+    WAITS
+};
+
 static void set_wait(unsigned which)
 {
     switch (which) {
-    case 0: OK(mbm_client_setAccept(&client, MBM_ACCEPT_TRANSACTION)); return;
-    case 1: OK(mbm_client_setAccept(&client, MBM_ACCEPT_UNIT)); return;
-    case 2: OK(mbm_client_setMessageWait(&client, 200)); return;
-    case 3: OK(mbm_client_setLenient(&client, 1)); return;
-    case 4: OK(mbm_client_setRetries(&client, 3)); return;
-    case 5: OK(mbm_link_setDelayAfterConnect(&kept, 500)); return;
-    case 6: OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_AFTER_FAILURE)); return;
-    case 7: OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_WHEN_IDLE)); return;
-    default: OK(mbm_client_setQuietTime(&client, 500)); return;
+    case ACCEPT_UNIT: OK(mbm_client_setAccept(&client, MBM_ACCEPT_UNIT)); return;
+    case ACCEPT_TRANSACTION: OK(mbm_client_setAccept(&client, MBM_ACCEPT_TRANSACTION)); return;
+    case MESSAGE_WAIT: OK(mbm_client_setMessageWait(&client, 200)); return;
+    case LENIENT: OK(mbm_client_setLenient(&client, 1)); return;
+    case RETRIES: OK(mbm_client_setRetries(&client, 3)); return;
+    case QUIET_TIME: OK(mbm_client_setQuietTime(&client, 500)); return;
+    case DELAY_AFTER_CONNECT: OK(mbm_link_setDelayAfterConnect(&kept, 500)); return;
+    case CLOSE_AFTER_FAILURE: OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_AFTER_FAILURE)); return;
+    default: OK(mbm_link_setClose(&kept, MBM_LINK_CLOSE_WHEN_IDLE)); return;
     }
 }
 
-static int is_of_link(unsigned which)
+static int has_wait(int framing, unsigned which)
 {
-    return which >= 5 && which <= 7;
+    if (framing == MBM_FRAMING_TCP)
+        return 1;
+    return which > LENIENT || (which == LENIENT && framing != MBM_FRAMING_ASCII);
 }
 
-TEST(a_request_ends_with_every_setting_that_waits)
+FRAMING_TEST(a_request_ends_with_every_setting_that_waits)
 {
-    enum { WAITS = 9, FIRST_FOR_ALL = 3 };
-
     for (unsigned i = 0; i < COUNT(TALKS); i++)
-        for (unsigned f = 0; f < COUNT(framings); f++)
-            for (unsigned w = 0; w < WAITS; w++) {
-                if (framings[f] != MBM_FRAMING_TCP &&
-                    (w < FIRST_FOR_ALL || (w == 3 && framings[f] == MBM_FRAMING_ASCII)))
-                    continue;
-                begin_peer(framings[f], is_of_link(w), TALKS[i].bytes, TALKS[i].count, 7);
-                set_wait(w);
-                for (unsigned round = 0; round < 4; round++) {
-                    queue_read(&request);
-                    if (until_end(&request) > 4 * MOST_MS || peer.most_reads > MOST_READS)
-                        fail_msg("%s, framing %d, setting %u", TALKS[i].what, framings[f], w);
-                }
-            }
+        for (unsigned w = 0; w < WAITS; w++) {
+            if (!has_wait(framing, w))
+                continue;
+            begin_peer(framing, w >= DELAY_AFTER_CONNECT, &TALKS[i], 7);
+            set_wait(w);
+            if (!requests_end(4 * MOST_MS))
+                fail_msg("%s, framing %d, setting %u", TALKS[i].what, framing, w);
+        }
 }
 
 /* After a request that was cancelled the next one rests until its unit is clean. */
-TEST(a_request_after_a_cancelled_one_ends)
+FRAMING_TEST(a_request_after_a_cancelled_one_ends)
 {
-    for (unsigned i = 0; i < COUNT(TALKS); i++)
-        for (unsigned f = 0; f < COUNT(framings); f++) {
-            begin_peer(framings[f], 0, TALKS[i].bytes, TALKS[i].count, 0);
-            queue_read(&request);
-            while (peer.sent == 0 && m.now < STEPS * MS) {
-                (void)mbm_client_poll(&client);
-                m.now += MS;
-            }
-            for (unsigned step = 0; step < 20; step++, m.now += MS)
-                (void)mbm_client_poll(&client);
-            OK(mbm_client_cancel(&client, &request));
-            peer.piece = 7;
-            queue_read(&request);
-            if (until_end(&request) > MOST_MS)
-                fail_msg("%s, framing %d", TALKS[i].what, framings[f]);
-        }
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        begin_peer(framing, 0, &TALKS[i], 0);
+        queue_read(&request);
+        while (peer.sent == 0 && m.now < STEPS * MS)
+            poll();
+        for (unsigned step = 0; step < 20; step++)
+            poll();
+        OK(mbm_client_cancel(&client, &request));
+        peer.piece = 7;
+        queue_read(&request);
+        if (until_end(&request) > MOST_MS)
+            fail_msg("%s, framing %d", TALKS[i].what, framing);
+    }
 }
 
-TEST(a_poll_of_an_idle_link_ends)
+FRAMING_TEST(a_poll_of_an_idle_link_ends)
 {
-    for (unsigned i = 0; i < COUNT(TALKS); i++)
-        for (unsigned f = 0; f < COUNT(framings); f++) {
-            begin_peer(framings[f], 1, TALKS[i].bytes, TALKS[i].count, 1);
-            for (unsigned step = 0; step < 100; step++, m.now += MS) {
-                peer.reads = 0;
-                (void)mbm_client_poll(&client);
-                assert_in_range(peer.reads, 0, MOST_READS);
-            }
-        }
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        begin_peer(framing, 1, &TALKS[i], 1);
+        for (unsigned step = 0; step < 100; step++)
+            poll();
+        assert_in_range(peer.most_reads, 0, MOST_READS);
+    }
 }
 
 /* --- a master, which waits in its call --- */
@@ -231,8 +225,7 @@ TEST(a_blocking_call_ends_whatever_arrives_without_a_pause)
 
     for (unsigned i = 0; i < COUNT(TALKS); i++)
         for (size_t piece = 1; piece <= 100; piece *= 10) {
-            const mbm_port port =
-                talker_begin(&peer, TALKS[i].bytes, TALKS[i].count, piece, &m.now);
+            const mbm_port port = talker_begin(&peer, &TALKS[i], piece, &m.now);
 
             memset(&line, 0, sizeof line);
             memset(&node, 0, sizeof node);

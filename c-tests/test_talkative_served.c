@@ -1,5 +1,6 @@
 /* Clients and devices that never stop sending, at a server and at a gateway: every poll ends, and
  * others are served. */
+#include "every_call.h"
 #include "gateway_bench.h"
 #include "talker.h"
 #include "test.h"
@@ -28,7 +29,7 @@ static const talk REQUESTS[] = {
 
 static void begin_server(int framing, const talk *t, size_t piece)
 {
-    const mbm_port port = talker_begin(&peer, t->bytes, t->count, piece, &now);
+    const mbm_port port = talker_begin(&peer, t, piece, &now);
 
     memset(&server, 0, sizeof server);
     memset(&table, 0, sizeof table);
@@ -36,44 +37,37 @@ static void begin_server(int framing, const talk *t, size_t piece)
     table.words = words;
     table.size = COUNT(words);
     OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    switch (framing) {
-    case MBM_FRAMING_RTU:
-        OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
-        break;
-    case MBM_FRAMING_ASCII:
-        OK(mbm_server_beginAscii(&server, &port, &unit, 1, frame, sizeof frame));
-        break;
-    case MBM_FRAMING_TCP:
-        OK(mbm_server_beginTcp(&server, &port, &unit, 1, frame, sizeof frame));
-        break;
-    default: OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame)); break;
-    }
+    OK(server_begin(&server, (unsigned)framing, &port, &unit, 1, frame, sizeof frame));
 }
 
 /* A frame has at most 260 bytes, and one is served in a poll. */
 enum { MOST_READS = 600 };
 
-static void polls_end(int framing, const talk *t, size_t piece)
+static void run(unsigned steps)
 {
-    begin_server(framing, t, piece);
-    for (unsigned step = 0; step < 200; step++, now += MS) {
+    for (unsigned step = 0; step < steps; step++, now += MS) {
         talker_poll_begins(&peer);
         (void)mbm_server_poll(&server);
         talker_poll_ends(&peer);
     }
+}
+
+static void polls_end(int framing, const talk *t, size_t piece)
+{
+    begin_server(framing, t, piece);
+    run(200);
     if (peer.most_reads > MOST_READS)
         fail_msg("%s, framing %d: %u reads", t->what, framing, peer.most_reads);
 }
 
-TEST(a_poll_of_a_server_ends_whatever_arrives_without_a_pause)
+FRAMING_TEST(a_poll_of_a_server_ends_whatever_arrives_without_a_pause)
 {
-    for (unsigned f = 0; f < COUNT(framings); f++)
-        for (size_t piece = 1; piece <= 1000; piece *= 10) {
-            for (unsigned i = 0; i < COUNT(TALKS); i++)
-                polls_end(framings[f], &TALKS[i], piece);
-            for (unsigned i = 0; i < COUNT(REQUESTS); i++)
-                polls_end(framings[f], &REQUESTS[i], piece);
-        }
+    for (size_t piece = 1; piece <= 1000; piece *= 10) {
+        for (unsigned i = 0; i < COUNT(TALKS); i++)
+            polls_end(framing, &TALKS[i], piece);
+        for (unsigned i = 0; i < COUNT(REQUESTS); i++)
+            polls_end(framing, &REQUESTS[i], piece);
+    }
 }
 
 /* Over a stream there is no silence before the next request. */
@@ -86,35 +80,24 @@ TEST(requests_without_a_pause_are_answered_one_by_one)
 }
 
 /* After the talk and a silence, a serial server understands the next request. */
-TEST(a_server_understands_the_request_after_the_talk)
+FRAMING_TEST(a_server_understands_the_request_after_the_talk)
 {
-    for (unsigned f = 0; f < COUNT(framings); f++) {
-        const talk *right = framings[f] == MBM_FRAMING_ASCII ? &REQUESTS[1] : &REQUESTS[0];
+    const talk *right = framing == MBM_FRAMING_ASCII ? &REQUESTS[1] : &REQUESTS[0];
 
-        if (framings[f] == MBM_FRAMING_TCP)
-            continue;
-        for (unsigned i = 0; i < COUNT(TALKS); i++) {
-            size_t sent;
-
-            polls_end(framings[f], &TALKS[i], 7);
-            peer.piece = 0;
-            for (unsigned step = 0; step < 2000; step++, now += MS)
-                (void)mbm_server_poll(&server);
-            sent = peer.sent;
-            peer.bytes = right->bytes;
-            peer.count = peer.each = peer.left = right->count;
-            peer.at = 0;
-            peer.piece = 100;
-            while (peer.left > 0) {
-                (void)mbm_server_poll(&server);
-                now += MS;
-            }
-            peer.each = peer.piece = 0;
-            for (unsigned step = 0; step < 2000; step++, now += MS)
-                (void)mbm_server_poll(&server);
-            if (peer.sent == sent)
-                fail_msg("no answer after %s, framing %d", TALKS[i].what, framings[f]);
-        }
+    if (framing == MBM_FRAMING_TCP)
+        return;
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        polls_end(framing, &TALKS[i], 7);
+        peer.piece = 0;
+        run(2000);
+        (void)talker_begin(&peer, right, 100, &now);
+        peer.each = peer.left = right->count;
+        while (peer.left > 0)
+            run(1);
+        peer.each = peer.piece = 0;
+        run(2000);
+        if (peer.sent == 0)
+            fail_msg("no answer after %s, framing %d", TALKS[i].what, framing);
     }
 }
 
@@ -164,13 +147,12 @@ static unsigned until_response(size_t length)
     return steps;
 }
 
-TEST_WITH(a_master_that_never_stops_keeps_no_other_from_being_answered, begin_gateway, NULL)
+TEST(a_master_that_never_stops_keeps_no_other_from_being_answered)
 {
     for (unsigned i = 0; i < COUNT(MASTERS); i++)
         for (int is_stuck = 0; is_stuck <= 1; is_stuck++)
             for (size_t piece = 1; piece <= 1000; piece *= 10) {
-                const mbm_port port =
-                    talker_begin(&peer, MASTERS[i].bytes, MASTERS[i].count, piece, &now);
+                const mbm_port port = talker_begin(&peer, &MASTERS[i], piece, &now);
 
                 begin_gateway();
                 now = 0;
@@ -190,45 +172,29 @@ TEST_WITH(a_master_that_never_stops_keeps_no_other_from_being_answered, begin_ga
             }
 }
 
-TEST_WITH(a_device_that_never_stops_keeps_no_request_and_no_other_line, begin_gateway, NULL)
+FRAMING_TEST(a_device_that_never_stops_keeps_no_request_and_no_other_line)
 {
     static uint8_t incoming[MBM_MAX_ASCII_FRAME], outgoing[MBM_MAX_TCP_FRAME];
+    mbm_client *client = &b.clients[0];
 
-    for (unsigned i = 0; i < COUNT(TALKS); i++)
-        for (unsigned f = 0; f < COUNT(framings); f++) {
-            mbm_port port;
-            mbm_client *client = &b.clients[0];
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        const mbm_port port = talker_begin(&peer, &TALKS[i], 7, &now);
 
-            begin_gateway();
-            now = 0;
-            port = talker_begin(&peer, TALKS[i].bytes, TALKS[i].count, 7, &now);
-            switch (framings[f]) {
-            case MBM_FRAMING_RTU:
-                OK(mbm_client_beginRtu(client, &port, incoming, sizeof incoming));
-                break;
-            case MBM_FRAMING_ASCII:
-                OK(mbm_client_beginAscii(client, &port, incoming, sizeof incoming));
-                break;
-            case MBM_FRAMING_TCP:
-                OK(mbm_client_beginTcp(client, &port, incoming, sizeof incoming, outgoing,
-                                       sizeof outgoing));
-                break;
-            default:
-                OK(mbm_client_beginRtuOverTcp(client, &port, incoming, sizeof incoming));
-                break;
-            }
-            OK(mbm_client_setResponseTimeout(client, 300));
-            for (unsigned round = 0; round < 4; round++) {
-                b.sockets[1].sent_count = 0;
-                ASK(1, round, UNIT, READ);
-                if (until_response(9) > 3000 || peer.most_reads > MOST_READS)
-                    fail_msg("%s, framing %d", TALKS[i].what, framings[f]);
-            }
+        begin_gateway();
+        now = 0;
+        OK(CLIENT_BEGIN(client, framing, &port, incoming, outgoing));
+        OK(mbm_client_setResponseTimeout(client, 300));
+        for (unsigned round = 0; round < 4; round++) {
             b.sockets[1].sent_count = 0;
-            ASK(1, 9, UNIT, READ);
-            ASK(1, 10, 101, READ);
-            REPLY(1, 1, VALUE);
-            /* Both responses. */
-            assert_in_range(until_response(18), 1, 3000);
+            ASK(1, round, UNIT, READ);
+            if (until_response(9) > 3000 || peer.most_reads > MOST_READS)
+                fail_msg("%s, framing %d", TALKS[i].what, framing);
         }
+        b.sockets[1].sent_count = 0;
+        ASK(1, 9, UNIT, READ);
+        ASK(1, 10, 101, READ);
+        REPLY(1, 1, VALUE);
+        /* Both responses. */
+        assert_in_range(until_response(18), 1, 3000);
+    }
 }

@@ -22,6 +22,8 @@ static uint16_t words[4];
 
 static const uint8_t framings[] = {MBM_FRAMING_RTU, MBM_FRAMING_ASCII, MBM_FRAMING_TCP,
                                    MBM_FRAMING_RTU_OVER_TCP};
+__attribute__((unused)) static const uint8_t streams[] = {MBM_FRAMING_TCP,
+                                                          MBM_FRAMING_RTU_OVER_TCP};
 
 /* What the hooks do, what they found, and what the callback received. */
 static uint8_t connects_with, status_is;

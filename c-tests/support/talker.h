@@ -8,9 +8,15 @@
 #include <stdint.h>
 #include <string.h>
 
+typedef struct talk {
+    const char *what;
+    const uint8_t *bytes;
+    size_t count;
+} talk;
+
 typedef struct talker {
-    const uint8_t *bytes; /* again and again */
-    size_t count, at;
+    const talk *says; /* again and again */
+    size_t at;
     size_t piece;        /* bytes of a read at most */
     size_t each;         /* bytes of each connection, which is lost then; 0: no end */
     size_t left;         /* of these */
@@ -23,12 +29,6 @@ typedef struct talker {
 } talker;
 
 #define BYTES(text) (const uint8_t *)(text), sizeof(text) - 1
-
-typedef struct talk {
-    const char *what;
-    const uint8_t *bytes;
-    size_t count;
-} talk;
 
 __attribute__((unused)) static const talk TALKS[] = {
     {"zeros", BYTES("\0")},
@@ -62,7 +62,7 @@ static inline int16_t talker_read(void *context, uint8_t *bytes, uint16_t capaci
         t->left -= count;
     }
     for (i = 0; i < count; i++, t->at++)
-        bytes[i] = t->bytes[t->at % t->count];
+        bytes[i] = t->says->bytes[t->at % t->says->count];
     return (int16_t)count;
 }
 
@@ -86,16 +86,14 @@ static inline uint32_t talker_micros(void *context)
     return *t->clock += t->step;
 }
 
-/* The port of a talker that says these bytes, with a clock of the test. */
-static inline mbm_port talker_begin(talker *t, const uint8_t *bytes, size_t count, size_t piece,
-                                    uint32_t *clock)
+/* The port of a talker that says this, with a clock of the test. */
+static inline mbm_port talker_begin(talker *t, const talk *says, size_t piece, uint32_t *clock)
 {
     const mbm_port port = {
         .context = t, .read = talker_read, .write = talker_write, .micros = talker_micros};
 
     memset(t, 0, sizeof *t);
-    t->bytes = bytes;
-    t->count = count;
+    t->says = says;
     t->piece = piece;
     t->clock = clock;
     return port;
