@@ -24,6 +24,15 @@ static inline void begin_port(void)
     USED(frame);
 }
 
+/* The setup of a plan with a table of fields and its storage: the arrays `positions`, `reads` and
+ * `data`. Its other members follow. */
+#define PLAN_SETUP(table, ...)                                                                     \
+    {                                                                                              \
+        .fields = (table), .positions = positions, .reads = reads, .data = data,                   \
+        .requests = &request, .fieldCount = sizeof positions / sizeof positions[0],                \
+        .dataWords = sizeof data / sizeof data[0], .requestCount = 1, __VA_ARGS__                  \
+    }
+
 /* Queues a request of every function of the standard, and of one user-defined function. */
 static inline void every_function(void)
 {

@@ -30,15 +30,7 @@ static const uint16_t counts[1] = {FIELDS};
 static mbm_planPosition positions[FIELDS];
 static mbm_planRead reads[FIELDS];
 static uint16_t data[WORDS];
-static const mbm_planSetup setup = {.fields = fields,
-                                    .positions = positions,
-                                    .reads = reads,
-                                    .data = data,
-                                    .requests = &request,
-                                    .fieldCount = FIELDS,
-                                    .readCount = 1,
-                                    .dataWords = WORDS,
-                                    .requestCount = 1};
+static const mbm_planSetup setup = PLAN_SETUP(fields, .readCount = 1);
 static const mbm_planConversion conversion = {
     .offset = -40, .powerField = 1, .flags = MBM_CONVERSION_POWER | MBM_CONVERSION_STANDARD};
 static mbm_plan plan;

@@ -62,15 +62,7 @@ static mbm_planPosition positions[DEVICE_FIELDS];
 static mbm_planRead reads[DEVICE_READS];
 static uint16_t data[DEVICE_DATA_WORDS];
 
-static const mbm_planSetup setup = {.fields = device_fields,
-                                    .positions = positions,
-                                    .reads = reads,
-                                    .data = data,
-                                    .requests = &request,
-                                    .fieldCount = DEVICE_FIELDS,
-                                    .readCount = DEVICE_READS,
-                                    .dataWords = DEVICE_DATA_WORDS,
-                                    .requestCount = 1};
+static const mbm_planSetup setup = PLAN_SETUP(device_fields, .readCount = DEVICE_READS);
 
 int main(void)
 {

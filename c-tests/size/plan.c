@@ -52,17 +52,8 @@ static void update(void *context, mbm_plan *plan, uint16_t field)
     }
 }
 
-static const mbm_planSetup setup = {.fields = fields,
-                                    .positions = positions,
-                                    .reads = reads,
-                                    .data = data,
-                                    .requests = &request,
-                                    .update = update,
-                                    .fieldCount = 10,
-                                    .readCount = READS,
-                                    .dataWords = WORDS,
-                                    .registerGap = 8,
-                                    .requestCount = 1};
+static const mbm_planSetup setup =
+    PLAN_SETUP(fields, .readCount = READS, .update = update, .registerGap = 8);
 
 int main(void)
 {
