@@ -35,15 +35,20 @@ static void waiting(void)
     wire->now += wire->idle_step;
 }
 
-/* Begins the line of the test with callbacks. */
+/* Begins callbacks on a port, and the line of the test on the callbacks. */
+static void begin_line(sim *s, const mbm_port *port)
+{
+    OK(mbm_nodeCallbacks_begin(&callbacks, port));
+    OK(mbm_line_beginRtu(&s->line, mbm_nodeCallbacks_port(&callbacks), s->buffer,
+                         sizeof s->buffer));
+}
+
 static void begin(sim *s)
 {
     wire = s;
     memset(called, 0, sizeof called);
     memset(&callbacks, 0, sizeof callbacks);
-    OK(mbm_nodeCallbacks_begin(&callbacks, &s->port));
-    OK(mbm_line_beginRtu(&s->line, mbm_nodeCallbacks_port(&callbacks), s->buffer,
-                         sizeof s->buffer));
+    begin_line(s, &s->port);
 }
 
 static void use_all(mbm_node *n)
@@ -95,9 +100,7 @@ SIM_TEST(callbacks_survive_a_begin_of_the_node_the_line_and_themselves)
     begin(s);
     use_all(n);
     sim_answer(s, 1, 5000, "12 03 02 00 07 +");
-    OK(mbm_nodeCallbacks_begin(&callbacks, &s->port));
-    OK(mbm_line_beginRtu(&s->line, mbm_nodeCallbacks_port(&callbacks), s->buffer,
-                         sizeof s->buffer));
+    begin_line(s, &s->port);
     OK(mbm_node_begin(n, &s->line, 18, s->response, 125, s->transmit, 123));
     OK(mbm_node_readHoldingRegisters(n, 0, 1));
     assert_string_equal(called, "bai");
@@ -183,29 +186,29 @@ static void heard(void *context, const mbm_traceRecord *record)
     (void)record;
 }
 
-/* A trace is behind the callbacks, not before them: the line must use the port of the callbacks. */
-SIM_TEST(callbacks_are_found_before_a_trace_and_not_behind_it)
+/* Begins a trace of a port, and the line of the test on the trace. */
+static void begin_trace(sim *s, mbm_trace *trace, const mbm_port *port)
 {
     static const mbm_framing rtu;
     static uint8_t space[2 * MBM_MAX_FRAME];
+
+    OK(mbm_trace_begin(trace, MBM_PACKET_REQUEST, port, &rtu, space, sizeof space, heard, NULL));
+    OK(mbm_line_beginRtu(&s->line, mbm_trace_port(trace), s->buffer, sizeof s->buffer));
+}
+
+/* The line must use the port of the callbacks. The trace may be below them, not above them. */
+SIM_TEST(callbacks_are_found_before_a_trace_and_not_behind_it)
+{
     mbm_trace trace = MBM_INIT;
 
-    wire = s;
-    memset(called, 0, sizeof called);
-    memset(&callbacks, 0, sizeof callbacks);
-    OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, &s->port, &rtu, space, sizeof space, heard,
-                       NULL));
-    OK(mbm_line_beginRtu(&s->line, mbm_trace_port(&trace), s->buffer, sizeof s->buffer));
+    begin(s);
+    begin_trace(s, &trace, &s->port);
     IS(MBM_NOT_INITIALISED, mbm_node_idle(n, waiting));
-    OK(mbm_nodeCallbacks_begin(&callbacks, mbm_trace_port(&trace)));
-    OK(mbm_line_beginRtu(&s->line, mbm_nodeCallbacks_port(&callbacks), s->buffer,
-                         sizeof s->buffer));
+    begin_line(s, mbm_trace_port(&trace));
     use_all(n);
     sim_reads(s, 5000);
     assert_string_equal(called, "bai");
     OK(mbm_nodeCallbacks_begin(&callbacks, &s->port));
-    OK(mbm_trace_begin(&trace, MBM_PACKET_REQUEST, mbm_nodeCallbacks_port(&callbacks), &rtu, space,
-                       sizeof space, heard, NULL));
-    OK(mbm_line_beginRtu(&s->line, mbm_trace_port(&trace), s->buffer, sizeof s->buffer));
+    begin_trace(s, &trace, mbm_nodeCallbacks_port(&callbacks));
     IS(MBM_NOT_INITIALISED, mbm_node_idle(n, waiting));
 }

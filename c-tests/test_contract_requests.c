@@ -6,33 +6,51 @@
 #define WORD(index) s->response[index]
 #define LAST(text) sim_assert_sent(s, s->sent - 1, text)
 
-SIM_TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
+/* Queues a word for the empty queue of address 7, and writes the queue. */
+static void one_queued_word_is_written(sim *s)
 {
-    mbm_node_beginTransmission(n, 7);
-    s->transmit[122] = 1;
-    s->transmit[0] = 0xAAAA;
-    OK(mbm_node_send(n, 0xBBBB));
+    OK(mbm_node_send(&s->node, 0xBBBB));
     sim_answer(s, 1, 100, "11 10 00 07 00 01 +");
-    OK(mbm_node_writeQueuedRegisters(n));
+    OK(mbm_node_writeQueuedRegisters(&s->node));
     LAST("11 10 00 07 00 01 02 BB BB +");
 }
 
-SIM_TEST(words_that_the_program_changes_leave_the_indices_alone)
+SIM_TEST(a_transmit_word_that_the_program_sets_leaves_the_queue)
 {
+    OK(mbm_node_beginTransmission(n, 7));
+    s->transmit[122] = 1;
+    s->transmit[0] = 0xAAAA;
+    one_queued_word_is_written(s);
+}
+
+/* The program clears the words of both buffers: by the calls, or itself. */
+static void indices_stay(sim *s, int by_call)
+{
+    mbm_node *n = &s->node;
+
     sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
     OK(mbm_node_readHoldingRegisters(n, 0, 2));
     assert_int_equal(mbm_node_receive(n), 1);
-    memset(s->response, 0, sizeof s->response);
+    if (by_call)
+        OK(mbm_node_clearResponseBuffer(n));
+    else
+        memset(s->response, 0, sizeof s->response);
     assert_int_equal(mbm_node_available(n), 1);
     assert_int_equal(mbm_node_receive(n), 0);
-    mbm_node_beginTransmission(n, 3);
-    mbm_node_send(n, 0x1111);
-    memset(s->transmit, 0, sizeof s->transmit);
-    mbm_node_send(n, 0x2222);
+    OK(mbm_node_beginTransmission(n, 3));
+    OK(mbm_node_send(n, 0x1111));
+    if (by_call)
+        OK(mbm_node_clearTransmitBuffer(n));
+    else
+        memset(s->transmit, 0, sizeof s->transmit);
+    OK(mbm_node_send(n, 0x2222));
     sim_answer(s, 1, 100, "11 10 00 03 00 02 +");
     OK(mbm_node_writeQueuedRegisters(n));
     LAST("11 10 00 03 00 02 04 00 00 22 22 +");
 }
+
+SIM_ROW(words_that_the_program_changes_leave_the_indices_alone, indices_stay(s, 0))
+SIM_ROW(clearing_the_buffers_leaves_the_indices_alone, indices_stay(s, 1))
 
 SIM_TEST(get_response_buffer_returns_ffff_past_the_end)
 {
@@ -49,27 +67,7 @@ SIM_TEST(set_transmit_buffer_returns_2_past_the_end_and_leaves_the_queue)
     IS(2, mbm_node_setTransmitBuffer(n, 123, 1));
     IS(2, mbm_node_setTransmitBuffer(n, 255, 1));
     OK(mbm_node_setTransmitBuffer(n, 0, 0xAAAA));
-    OK(mbm_node_send(n, 0xBBBB));
-    sim_answer(s, 1, 100, "11 10 00 07 00 01 +");
-    OK(mbm_node_writeQueuedRegisters(n));
-    LAST("11 10 00 07 00 01 02 BB BB +");
-}
-
-SIM_TEST(clearing_the_buffers_leaves_the_indices_alone)
-{
-    sim_answer(s, 1, 100, "11 03 04 00 01 00 02 +");
-    OK(mbm_node_readHoldingRegisters(n, 0, 2));
-    assert_int_equal(mbm_node_receive(n), 1);
-    OK(mbm_node_clearResponseBuffer(n));
-    assert_int_equal(mbm_node_available(n), 1);
-    assert_int_equal(mbm_node_receive(n), 0);
-    OK(mbm_node_beginTransmission(n, 3));
-    OK(mbm_node_send(n, 0x1111));
-    OK(mbm_node_clearTransmitBuffer(n));
-    OK(mbm_node_send(n, 0x2222));
-    sim_answer(s, 1, 100, "11 10 00 03 00 02 +");
-    OK(mbm_node_writeQueuedRegisters(n));
-    LAST("11 10 00 03 00 02 04 00 00 22 22 +");
+    one_queued_word_is_written(s);
 }
 
 SIM_TEST(response_words_survive_a_failure_and_transmit_words_every_request)
