@@ -83,28 +83,36 @@ fn call<T>(
     result
 }
 
+/// The queued request of function 1 or 2.
+fn request_of_bits(function: u8, bits: &mut [bool]) -> Result<Request<'_>, Error> {
+    match function {
+        1 => Request::read_coils(UNIT, 7, bits),
+        _ => Request::read_discrete_inputs(UNIT, 7, bits),
+    }
+}
+
+/// The queued request of function 3 or 4.
+fn request_of_registers(function: u8, words: &mut [u16]) -> Result<Request<'_>, Error> {
+    match function {
+        3 => Request::read_holding_registers(UNIT, 107, words),
+        _ => Request::read_input_registers(UNIT, 107, words),
+    }
+}
+
 #[test]
 fn reads_of_the_four_tables_fill_slices_and_arrays() {
     let (mut bits, mut words) = ([false; 10], [0; 2]);
     for function in [1, 2] {
         let (sent, answer): (&[u8], &[u8]) = (&[function, 0, 7, 0, 10], &[function, 2, 0x41, 2]);
-        let request = match function {
-            1 => Request::read_coils(UNIT, 7, &mut bits),
-            _ => Request::read_discrete_inputs(UNIT, 7, &mut bits),
-        };
+        let request = request_of_bits(function, &mut bits);
         let mut read = [true; 10];
         call(&[sent], &[answer], request, |client| match function {
             1 => client.read_coils(UNIT, 7, &mut read),
             _ => client.read_discrete_inputs(UNIT, 7, &mut read),
         });
-        let expected = [0, 6, 9].map(|on| (on, true));
-        let on = |(at, on): &(usize, bool)| *on && expected.contains(&(*at, true));
-        assert_eq!(read.into_iter().enumerate().filter(on).count(), 3);
-        assert_eq!(read.iter().filter(|on| **on).count(), 3);
-        let request = match function {
-            1 => Request::read_coils(UNIT, 7, &mut bits),
-            _ => Request::read_discrete_inputs(UNIT, 7, &mut bits),
-        };
+        let expected: [bool; 10] = std::array::from_fn(|at| [0, 6, 9].contains(&at));
+        assert_eq!(read, expected);
+        let request = request_of_bits(function, &mut bits);
         let array: [bool; 10] = call(&[sent], &[answer], request, |client| match function {
             1 => client.coils(UNIT, 7),
             _ => client.discrete_inputs(UNIT, 7),
@@ -115,19 +123,13 @@ fn reads_of_the_four_tables_fill_slices_and_arrays() {
         let (sent, answer): (&[u8], &[u8]) =
             (&[function, 0, 107, 0, 2], &[function, 4, 2, 43, 0, 100]);
         let mut read = [0; 2];
-        let request = match function {
-            3 => Request::read_holding_registers(UNIT, 107, &mut words),
-            _ => Request::read_input_registers(UNIT, 107, &mut words),
-        };
+        let request = request_of_registers(function, &mut words);
         call(&[sent], &[answer], request, |client| match function {
             3 => client.read_holding_registers(UNIT, 107, &mut read),
             _ => client.read_input_registers(UNIT, 107, &mut read),
         });
         assert_eq!(read, [555, 100]);
-        let request = match function {
-            3 => Request::read_holding_registers(UNIT, 107, &mut words),
-            _ => Request::read_input_registers(UNIT, 107, &mut words),
-        };
+        let request = request_of_registers(function, &mut words);
         let [first, second] = call(&[sent], &[answer], request, |client| match function {
             3 => client.holding_registers(UNIT, 107),
             _ => client.input_registers(UNIT, 107),
