@@ -179,8 +179,7 @@ fn one_missing_field_of_a_hundred_leaves_three_reads() {
     let mut world = World::new(registers(0..100), &LIMITS, usize::MAX, 0);
     let device = Device {
         holes: [(HOLDING_REGISTERS, 37)].into(),
-        most: 2000,
-        is_mute: false,
+        ..Device::whole()
     };
     assert_eq!(world.count, 1);
     world.run(&device, 900);
@@ -201,8 +200,7 @@ fn one_missing_register_between_fields_leaves_two_reads() {
         let mut world = World::new(fields, &limits, usize::MAX, SPARE);
         let device = Device {
             holes: [(HOLDING_REGISTERS, hole)].into(),
-            most: 2000,
-            is_mute: false,
+            ..Device::whole()
         };
         assert_eq!(world.count, 1);
         world.run(&device, 900);
@@ -229,8 +227,7 @@ fn each_of_600_coils_is_read_although_the_device_ignores_reads_of_more_than_400(
     let mut world = World::new(fields, &limits, usize::MAX, SPARE);
     let lacking = Device {
         holes: [(COILS, 300)].into(),
-        most: 2000,
-        is_mute: false,
+        ..Device::whole()
     };
     world.run(&lacking, 900);
     is_found(&world, &lacking);
@@ -343,8 +340,7 @@ fn the_search_of_one_block_leaves_others_as_they_are() {
     let mut world = World::new(fields, &limits, usize::MAX, 0);
     let device = Device {
         holes: [(COILS, 21), (HOLDING_REGISTERS, 70)].into(),
-        most: 2000,
-        is_mute: false,
+        ..Device::whole()
     };
     // The coil is found before the first read of the registers is refused.
     world.run(&device, 900);

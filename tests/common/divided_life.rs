@@ -30,9 +30,13 @@ const BOUND_MS: u32 = BACKOFF.longest_ms + 2 * RETRY_MS + 10 * LONGEST_MS;
 /// More words than any plan needs here.
 const SPARE: usize = 4000;
 
+fn one_of<T: Copy>(choices: &mut dyn Choices, items: &[T]) -> T {
+    items[choices.below(items.len() as u32) as usize]
+}
+
 fn field(choices: &mut dyn Choices) -> Field {
     let table = 1 + choices.below(4) as u8;
-    let of_registers = [UINT16, UINT16, UINT32, UINT64, REGISTERS][choices.below(5) as usize];
+    let of_registers = one_of(choices, &[UINT16, UINT16, UINT32, UINT64, REGISTERS]);
     Field {
         unit: 1 + choices.below(UNITS.into()) as u16,
         table,
@@ -42,8 +46,8 @@ fn field(choices: &mut dyn Choices) -> Field {
             of_registers
         },
         address: choices.below(60) as u16,
-        count: 1 + [0, 0, 0, 1, 2][choices.below(5) as usize],
-        interval_ms: [200, LONGEST_MS][choices.below(2) as usize],
+        count: one_of(choices, &[1, 1, 1, 2, 3]),
+        interval_ms: one_of(choices, &[200, LONGEST_MS]),
         ..Field::NONE
     }
 }
@@ -66,10 +70,6 @@ struct Life<'a> {
 }
 
 impl Life<'_> {
-    fn unit(&mut self) -> usize {
-        self.choices.below(UNITS.into()) as usize
-    }
-
     fn device_of(&self, field: &Field) -> &Device {
         &self.units[usize::from(field.unit) - 1].device
     }
@@ -87,7 +87,7 @@ impl Life<'_> {
 
     /// A device changes.
     fn change(&mut self) {
-        let at = self.unit();
+        let at = self.choices.below(UNITS.into()) as usize;
         match self.choices.below(6) {
             0 | 1 => {
                 let place = if self.choices.below(4) == 0 {
@@ -95,7 +95,7 @@ impl Life<'_> {
                     (table, self.choices.below(70) as u16)
                 } else {
                     let fields = &self.world.fields;
-                    let field = &fields[self.choices.below(fields.len() as u32) as usize];
+                    let field = one_of(self.choices, fields);
                     let nth = self.choices.below(field.length()) as u16;
                     (field.table, field.address + nth)
                 };
@@ -108,7 +108,7 @@ impl Life<'_> {
                     holes.remove(&hole);
                 }
             }
-            3 => self.units[at].device.most = [2000, 2000, 40, 12][self.choices.below(4) as usize],
+            3 => self.units[at].device.most = one_of(self.choices, &[2000, 2000, 40, 12]),
             4 => self.units[at].device.is_mute = self.choices.below(2) == 0,
             _ => self.units[at].is_silent = !self.units[at].is_silent,
         }
@@ -138,7 +138,7 @@ impl Life<'_> {
                 Status::exception(4),
                 Status::exception(0x0B),
             ];
-            status = disturbances[self.choices.below(7) as usize];
+            status = one_of(self.choices, &disturbances);
         }
         self.world.end(nth, status);
         if self.has_storage {
@@ -215,9 +215,9 @@ fn is_refusal(status: Status) -> bool {
 pub fn live(choices: &mut dyn Choices) {
     let limits = Limits {
         bits: 0,
-        registers: [0, 0, 20][choices.below(3) as usize],
-        bit_gap: [0, 30][choices.below(2) as usize],
-        register_gap: [0, 4, 30][choices.below(3) as usize],
+        registers: one_of(choices, &[0, 0, 20]),
+        bit_gap: one_of(choices, &[0, 30]),
+        register_gap: one_of(choices, &[0, 4, 30]),
         units: &[],
         excluded: &[],
     };
@@ -279,7 +279,7 @@ pub fn live(choices: &mut dyn Choices) {
             "{field:?} is {age} ms old"
         );
     }
-    // What is there again is read again.
+    // The devices have all registers again, so all fields are read again.
     for unit in &mut life.units {
         unit.device = Device::whole();
     }
