@@ -23,7 +23,7 @@ unsafe extern "C" fn update(_: *mut c_void, plan: *mut mbm_plan, field: u16) {
         && !life.is_forged.get()
         && !life.may_jump.get();
     if is_sure && status == MBM_ILLEGAL_DATA_ADDRESS {
-        assert!(side.lacks.get() >> field & 1 != 0, "field {field} is there");
+        assert!(side.lacks_field(field), "field {field} is there");
     }
     side.news[usize::from(field)].set(life.lines[side.line.get()].awake.get());
     life.callback();
@@ -41,11 +41,14 @@ impl PlanSide {
         }
     }
 
+    fn lacks_field(&self, field: u16) -> bool {
+        self.lacks.get() >> field & 1 != 0
+    }
+
     /// Whether the devices lack one of these registers.
     pub fn is_lacking(&self, first: u16, count: u16) -> bool {
-        let lacks = |field: u16| self.lacks.get() >> field & 1 != 0;
         (0..FIELDS as u16)
-            .filter(|field| lacks(*field))
+            .filter(|field| self.lacks_field(*field))
             .any(|field| (first..first.saturating_add(count)).contains(&(DISTANCE * field)))
     }
 
