@@ -64,7 +64,7 @@ SIM_TEST(callbacks_come_in_the_order_of_modbusmaster)
     use_all(n);
     sim_reads(s, 5000);
     assert_string_equal(called, "bai");
-    /* The port's own hooks around them: the driver is on from the first to the last. */
+    /* The port's own hooks are called around the callbacks: the driver is on all the time. */
     sim_assert_order(s, "PWO", "PWO");
     assert_int_equal(s->driver_on, 0);
     assert_int_equal(s->idle_while_driving, 0);
@@ -80,8 +80,7 @@ SIM_TEST(idle_is_called_only_while_a_reply_is_awaited)
     const unsigned idles = s->idles;
     OK(mbm_node_preTransmission(n, before));
     sim_reads(s, 5000);
-    /* No call in the gap, where the port's own hook waits; none of those while a reply is awaited.
-     */
+    /* The port's own hook has waited in the gap, and the callback for the reply. */
     assert_string_equal(called, "bi");
     assert_true(s->idles > idles);
 }

@@ -73,7 +73,7 @@ STREAM_TEST(a_peer_that_sends_a_text_and_closes_each_connection_fails_the_reques
         IS(MBM_LINK_LOST, request.status);
         assert_in_range(connects - before, 0, 2);
     }
-    /* The attempts after that have their waits. */
+    /* The link waits before each later attempt. */
     run(5000);
     assert_in_range(connects, 2, 20);
     assert_int_equal(peer.sent, 0);
@@ -104,7 +104,8 @@ STREAM_TEST(requests_that_wait_for_the_link_make_no_loop_of_connections_that_are
     queue_read(&request);
     run(5000);
     IS(MBM_PENDING, request.status);
-    /* Two each half second: that of the wait, and the one that the request opens. */
+    /* Two connections each half second: the link opens one after its wait, and one for the request.
+     */
     assert_in_range(connects, 5, 25);
 }
 

@@ -17,11 +17,11 @@ typedef struct talk {
 typedef struct talker {
     const talk *says; /* again and again */
     size_t at;
-    size_t piece;        /* bytes of a read at most */
-    size_t each;         /* bytes of each connection, which is lost then; 0: no end */
-    size_t left;         /* of these */
+    size_t piece;        /* how many bytes a read returns at most */
+    size_t each;         /* a connection is lost after so many bytes; 0: never */
+    size_t left;         /* how many bytes are left until then */
     unsigned reads;      /* since the last poll began */
-    unsigned most_reads; /* of a poll */
+    unsigned most_reads; /* the most reads of one poll */
     uint32_t *clock;
     uint32_t step; /* microseconds that each look at the clock takes */
     size_t sent;

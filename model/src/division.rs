@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 const INTERVAL_MS: u32 = 5000;
 /// The fields are registers from 0 on.
 const FIELDS: u16 = 4;
-/// In which time all is found from any state.
+/// Within this time each field is read, or found not to be there, from any state.
 const BOUND_MS: u32 = BACKOFF.longest_ms + 2 * RETRY_MS + 2 * INTERVAL_MS;
 
 #[derive(Clone, Copy, Debug)]
