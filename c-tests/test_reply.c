@@ -415,13 +415,7 @@ static void begin_client(void)
 
     memset(&m, 0, sizeof m);
     memset(&request, 0, sizeof request);
-    if (framing == MBM_FRAMING_RTU)
-        OK(mbm_client_beginRtu(&client, &port, client_frame, sizeof client_frame));
-    else if (framing == MBM_FRAMING_ASCII)
-        OK(mbm_client_beginAscii(&client, &port, client_frame, sizeof client_frame));
-    else
-        OK(mbm_client_beginTcp(&client, &port, client_frame, sizeof client_frame, client_outgoing,
-                               sizeof client_outgoing));
+    OK(CLIENT_BEGIN(&client, framing, &port, client_frame, client_outgoing));
     request.unit = SERVED_UNIT;
     request.reply = data_reply;
     request.replyBytes = sizeof data_reply;
