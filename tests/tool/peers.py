@@ -432,6 +432,10 @@ class TcpDevice:
     def line(self):
         return f"tcp://[{self.host}]:{self.port}" if ":" in self.host else f"tcp://{self.host}:{self.port}"
 
+    def requests(self):
+        """Function, address and quantity of each read."""
+        return [tuple(int(pdu[i:j], 16) for i, j in ((0, 2), (2, 6), (6, 10))) for _, pdu in self.asked]
+
     def come(self):
         family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
         self.listener = socket.create_server((self.host, self.port), family=family)

@@ -58,10 +58,6 @@ class Device(TcpDevice):
             found.append(reply[2] & 1 if is_coils else int.from_bytes(reply[2:], "big"))
         return found
 
-    def requests(self):
-        """Function, address and quantity of each read."""
-        return [tuple(int(pdu[i:j], 16) for i, j in ((0, 2), (2, 6), (6, 10))) for _, pdu in self.asked]
-
 
 @pytest.fixture(scope="module", params=["libmodbus", "pymodbus", "mbm"])
 def port(request):

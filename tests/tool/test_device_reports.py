@@ -46,9 +46,6 @@ class Reported(TcpDevice):
     def get(self, address):
         return self.held.get(address, (self.words or {}).get(address, word(address)))
 
-    def requests(self):
-        return [tuple(int(pdu[i:j], 16) for i, j in ((0, 2), (2, 6), (6, 10))) for _, pdu in self.asked]
-
 
 def polled(mbm, write, device, text, code=DONE, rounds=1):
     found = mbm("poll", device.line, write("device.yaml", text), "--rounds", rounds, "--json", *PATIENT)

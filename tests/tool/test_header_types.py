@@ -140,6 +140,8 @@ LIMITS = [
     ("int48_m10k", "min_value: -100, max_value: 1e10"), ("uint48", "min_value: 0, max_value: 1e10, step: 1000"),
     ("sign_magnitude16", "offset: 0.5, max_value: 100"), ("float", "min_value: 0, max_value: 30, step: 1"), ("float16", "max_value: 30"),
 ]
+LIMITED = "device: limited\nfields:\n" + "".join(f"  - {{name: f{at}, table: holding, address: {4 * at}, access: read-write, type: {kind}, {keys}}}\n"
+                                              for at, (kind, keys) in enumerate(LIMITS))
 RAW = sorted({sign * (amount + near) for amount in (0, 1, 2, 3, 6, 10, 16, 50, 100, 300, 4095, 9000, 32767, 40000, 50000, 65535, 70000, 2**31, 2**32,
                                                     10**10, 10**17, 9 * 10**17) for near in (-1, 0, 1, 2) for sign in (-1, 1)})
 RANGES = {"int16": (-2**15, 2**15 - 1), "uint16": (0, 2**16 - 1), "uint32": (0, 2**32 - 1), "int32": (-2**31, 2**31 - 1), "uint64": (0, 2**64 - 1),
@@ -157,18 +159,22 @@ def is_allowed(raw, kind, keys):
             (not step or (value - of.get("min_value", 0)) % step == 0))
 
 
+def linked(folder, option):
+    """The program of program.c."""
+    done = run("gcc", option, f"-I{ROOT}/include", f"{folder}/program.c", f"{ROOT}/target/release/libmbm.a", "-o", f"{folder}/program")
+    assert done.code == 0, done.error
+    return f"{folder}/program"
+
+
 def test_a_number_beyond_the_limits_of_a_field_is_refused_as_the_file_says(plain, folder, write):
-    fields = "".join(f"  - {{name: f{at}, table: holding, address: {4 * at}, access: read-write, type: {kind}, {keys}}}\n"
-                     for at, (kind, keys) in enumerate(LIMITS))
-    header_of(plain, folder, write("limited.yaml", "device: limited\nfields:\n" + fields), "LIMITED")
+    header_of(plain, folder, write("limited.yaml", LIMITED), "LIMITED")
     tried = [[raw for raw in RAW if RANGES[kind][0] <= raw <= RANGES[kind][1]] for kind, _ in LIMITS]
     calls = [f"limited_check_f{at}({raw}{'ull' if raw > 2**31 else 'll'})" for at, numbers in enumerate(tried) for raw in numbers]
     write("program.c", '#define LIMITED_SERVER\n#include "limited.h"\n#include <stdio.h>\nint main(void)\n{\n'
           + "".join(f'    printf("%u ", {call});\n' for call in calls) + "    return 0;\n}\n")
-    done = run("gcc", "-w", f"-I{ROOT}/include", f"{folder}/program.c", f"{ROOT}/target/release/libmbm.a", "-o", f"{folder}/program")
-    assert done.code == 0, done.error
+    program = linked(folder, "-w")
     wanted = [is_allowed(raw, kind, keys) for (kind, keys), numbers in zip(LIMITS, tried) for raw in numbers]
-    found = [word == "0" for word in run(f"{folder}/program").out.split()]
+    found = [word == "0" for word in run(program).out.split()]
     assert [call for call, one, other in zip(calls, found, wanted, strict=True) if one != other] == []
     assert len(set(found)) == 2
 
@@ -197,18 +203,15 @@ int main(void)
     return value != 4;
 }
 """)
-    done = run("gcc", "-std=c11", f"-I{ROOT}/include", f"{folder}/program.c", f"{ROOT}/target/release/libmbm.a", "-o", f"{folder}/program")
-    assert done.code == 0, done.error
+    program = linked(folder, "-std=c11")
     # 1.4, 1.6 and 2.0: of them only 2.0 is 1.5 and a multiple of 0.5.
     out_of_range = 246
-    assert run(f"{folder}/program") == (DONE, f"{out_of_range} 7 {out_of_range} 7 0 16 0 0\n", "")
+    assert run(program) == (DONE, f"{out_of_range} 7 {out_of_range} 7 0 16 0 0\n", "")
 
 
 @pytest.mark.parametrize("compiler", COMPILERS, ids=" ".join)
 def test_each_compiler_takes_the_checks_of_limits(plain, folder, write, compiler):
-    fields = "".join(f"  - {{name: f{at}, table: holding, address: {4 * at}, access: read-write, type: {kind}, {keys}}}\n"
-                     for at, (kind, keys) in enumerate(LIMITS))
-    header_of(plain, folder, write("limited.yaml", "device: limited\nfields:\n" + fields), "LIMITED")
+    header_of(plain, folder, write("limited.yaml", LIMITED), "LIMITED")
     program = write("limited.c", '#define LIMITED_SERVER\n#include "limited.h"\nuint8_t use(int8_t value);\nuint8_t use(int8_t value)\n{\n    return '
                     + " | ".join(f"limited_check_f{at}({'(uint8_t)' if kind.startswith(('u', 'b')) else ''}value)" for at, (kind, _) in enumerate(LIMITS))
                     + ";\n}\n")
