@@ -80,7 +80,8 @@ char *header_upper(const char *text)
     return upper;
 }
 
-char *header_lower(const char *upper)
+/* The same name in lower case. NULL without memory. */
+static char *to_lower(const char *upper)
 {
     char *lower = strdup(upper), *at;
 
@@ -153,7 +154,10 @@ static void free_names(header *h)
     tdestroy(h->names, free_name);
     for (i = 0; h->fields && i < h->of->count; i++)
         free(h->fields[i]);
+    for (i = 0; h->lowers && i < h->of->count; i++)
+        free(h->lowers[i]);
     free(h->fields);
+    free(h->lowers);
     free(h->upper);
     free(h->lower);
 }
@@ -182,7 +186,7 @@ static int choose_device(header *h, const char *name)
     }
     name = name ? name : base ? base : h->of->name;
     h->upper = header_upper(name);
-    h->lower = h->upper ? header_lower(h->upper) : NULL;
+    h->lower = h->upper ? to_lower(h->upper) : NULL;
     if (!h->lower) {
         free(base);
         return fail();
@@ -217,7 +221,8 @@ static int choose_names(header *h, const char *name)
     uint16_t i;
 
     h->fields = (char **)calloc(h->of->count, sizeof *h->fields);
-    if (!h->fields)
+    h->lowers = (char **)calloc(h->of->count, sizeof *h->lowers);
+    if (!h->fields || !h->lowers)
         return fail();
     if (!choose_device(h, name))
         return 0;
@@ -231,7 +236,8 @@ static int choose_names(header *h, const char *name)
         const device_field *field = &h->of->fields[i];
 
         h->fields[i] = header_upper(field->name);
-        if (!h->fields[i])
+        h->lowers[i] = h->fields[i] ? to_lower(h->fields[i]) : NULL;
+        if (!h->lowers[i])
             return fail();
         if (!header_define(h, i, "", field->line))
             return 0;
@@ -450,7 +456,8 @@ static int write_header(job *j, header *h)
     if (!header_write_fields(h) || !header_write_plan(h))
         return 0;
     header_write_reach(h);
-    if (!header_write_checks(h) || !header_write_types(h) || !header_write_server(h))
+    header_write_checks(h);
+    if (!header_write_types(h) || !header_write_server(h))
         return 0;
     fprintf(h->out, "\n#endif\n");
     return 1;

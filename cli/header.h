@@ -24,7 +24,7 @@ typedef struct header {
     const device *of;
     const char *path, *file; /* of the device file, whole and without its folders */
     char *upper, *lower;     /* the C name of the device */
-    char **fields;           /* the C names of its fields, in upper case */
+    char **fields, **lowers; /* the C names of its fields, in upper and in lower case */
     header_scale *scales;
     void *names;   /* that the header defines: a tree of tsearch */
     uint16_t unit; /* of all fields; 0 if they have several */
@@ -42,9 +42,6 @@ int header_define(header *h, uint16_t field, const char *suffix, int line);
 /* Turns a text into a part of a C name: its identifier in upper case. NULL without memory; empty if
  * it has no letter and no digit. */
 char *header_upper(const char *text);
-
-/* The same name in lower case, to be freed. NULL without memory. */
-char *header_lower(const char *upper);
 
 /* Writes a text for a comment in C: what would end or begin a comment, or change the direction of
  * the line, is replaced. */
@@ -79,8 +76,8 @@ void header_write_meaning(FILE *out, const device_field *field, const char *befo
 int header_write_limit_constants(header *h, uint16_t at);
 
 /* Writes the functions that check whether a number is within the limits of a field; whether a field
- * has such a function. Writing returns 0 after reporting a refusal. */
-int header_write_checks(const header *h);
+ * has such a function. */
+void header_write_checks(const header *h);
 int header_is_checked(const header *h, uint16_t at);
 
 /* Writes the conversions of a plan's fields. Returns 0 after reporting a refusal. */

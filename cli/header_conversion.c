@@ -9,8 +9,6 @@
 #include "report.h"
 
 #include <inttypes.h>
-#include <stdlib.h>
-#include <string.h>
 
 int header_is_scaled(const device_field *field)
 {
@@ -190,18 +188,12 @@ static void write_getters(const header *h, uint16_t at, const char *lower, const
 static int write_field(const header *h, uint16_t at)
 {
     const int is_shared = is_standard_only(&h->of->fields[at]);
-    char *lower = header_lower(h->fields[at]);
-    int is_right;
+    const char *lower = h->lowers[at];
 
-    if (!lower) {
-        (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
+    if (!is_shared && !write_constant(h, at, lower))
         return 0;
-    }
-    is_right = is_shared || write_constant(h, at, lower);
-    if (is_right)
-        write_getters(h, at, lower, is_shared ? "standard" : say("%s_conversion", lower));
-    free(lower);
-    return is_right;
+    write_getters(h, at, lower, is_shared ? "standard" : say("%s_conversion", lower));
+    return 1;
 }
 
 /* Writes the constant that fields share, if one needs it. */
@@ -237,15 +229,13 @@ static void write_table(const header *h)
     for (i = 0; i < h->of->readable; i++) {
         const uint16_t at = h->order[i];
         const char *comma = i + 1 < h->of->readable ? "," : "";
-        char *lower = header_lower(h->fields[at]);
 
         if (!has_constant(h, at))
             fprintf(h->out, "    NULL%s\n", comma);
         else if (is_standard_only(&h->of->fields[at]))
             fprintf(h->out, "    &%s_standard%s\n", h->lower, comma);
         else
-            fprintf(h->out, "    &%s_%s_conversion%s\n", h->lower, lower ? lower : "", comma);
-        free(lower);
+            fprintf(h->out, "    &%s_%s_conversion%s\n", h->lower, h->lowers[at], comma);
     }
     fprintf(h->out, "};\n");
 }

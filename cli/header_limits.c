@@ -6,7 +6,6 @@
 
 #include "decimal.h"
 #include "numbers.h"
-#include "report.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -301,14 +300,14 @@ int header_is_checked(const header *h, uint16_t at)
 }
 
 /* Writes the function that checks a number. */
-static void write_check(const header *h, uint16_t at, const char *name)
+static void write_check(const header *h, uint16_t at)
 {
     const limits of = limits_of(h, at);
     const int least = what_a_limit_allows(h, at, of.least, 1);
     const int most = what_a_limit_allows(h, at, of.most, -1);
     const char *and = "";
 
-    fprintf(h->out, "\nstatic inline uint8_t %s_check_%s(%s value)\n{\n", h->lower, name,
+    fprintf(h->out, "\nstatic inline uint8_t %s_check_%s(%s value)\n{\n", h->lower, h->lowers[at],
             header_number_type(&h->of->planned[at]));
     if (least == NONE || most == NONE || (least == ALL && most == ALL && !has_step(h, at))) {
         fprintf(h->out, "    (void)value;\n    return %s;\n}\n",
@@ -331,14 +330,12 @@ static void write_check(const header *h, uint16_t at, const char *name)
     fprintf(h->out, " ? MBM_OK : MBM_OUT_OF_RANGE;\n}\n");
 }
 
-int header_write_checks(const header *h)
+void header_write_checks(const header *h)
 {
     int is_first = 1;
     uint16_t i;
 
     for (i = 0; i < h->of->count; i++) {
-        char *name;
-
         if (!header_is_checked(h, i))
             continue;
         if (is_first)
@@ -348,15 +345,8 @@ int header_write_checks(const header *h)
                     "#if defined(%s_PLAN) || defined(%s_SERVER)\n#include \"mbm.h\"\n",
                     h->upper, h->upper);
         is_first = 0;
-        name = header_lower(h->fields[i]);
-        if (!name) {
-            (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
-            return 0;
-        }
-        write_check(h, i, name);
-        free(name);
+        write_check(h, i);
     }
     if (!is_first)
         fprintf(h->out, "#endif\n");
-    return 1;
 }

@@ -461,20 +461,17 @@ static void write_by_view(const header *h, const mbm_planField *planned, const c
     }
 }
 
-/* Writes the functions of the fields of a table. Returns 0 without memory. */
-static int write_functions(const header *h, const cells *of)
+/* Writes the functions of the fields of a table. */
+static void write_functions(const header *h, const cells *of)
 {
     uint16_t i;
 
     for (i = 0; i < h->of->count; i++) {
         const mbm_planField *planned = &h->of->planned[i];
-        char *name;
+        const char *name = h->lowers[i];
 
         if (planned->unit != of->unit || planned->table != of->table)
             continue;
-        name = header_lower(h->fields[i]);
-        if (!name)
-            return 0;
         fprintf(h->out, "\n/* ");
         header_comment(h->out, h->of->fields[i].name);
         fprintf(h->out, " */");
@@ -490,9 +487,7 @@ static int write_functions(const header *h, const cells *of)
             write_by_view(h, planned, of, name);
         else
             write_number(h, planned, of, name);
-        free(name);
     }
-    return 1;
 }
 
 /* Whether the functions of a field swap bytes themselves. */
@@ -519,7 +514,7 @@ static void write_swap(const header *h)
 /* --- the part --- */
 
 /* Writes the assignments of the file's values to the cells of a table. */
-static int write_values(const header *h, const cells *of)
+static void write_values(const header *h, const cells *of)
 {
     const uint32_t step = is_bits(of->table) ? 8 : 1;
     uint32_t at, bit;
@@ -536,12 +531,11 @@ static int write_values(const header *h, const cells *of)
             fprintf(h->out, "    %s[%u] = 0x%0*Xu;\n", of->names[part],
                     (unsigned)((at - of->first[part]) / step), step == 8 ? 2 : 4, value);
         }
-    return 1;
 }
 
-/* Calls a function for each table of each unit. Returns 0 if it does. */
-static int for_each_table(const header *h, cells *of,
-                          int (*write)(const header *h, const cells *of))
+/* Calls a function for each table of each unit. */
+static void for_each_table(const header *h, cells *of,
+                           void (*write)(const header *h, const cells *of))
 {
     uint16_t unit;
     uint8_t table;
@@ -549,10 +543,9 @@ static int for_each_table(const header *h, cells *of,
     for (unit = 1; unit <= 255; unit++)
         for (table = MBM_TABLE_COILS; table <= MBM_TABLE_INPUT_REGISTERS; table++) {
             find_cells(h, unit, table, of);
-            if (of->parts > 0 && !write(h, of))
-                return 0;
+            if (of->parts > 0)
+                write(h, of);
         }
-    return 1;
 }
 
 static int has_float(const header *h)
@@ -564,8 +557,8 @@ static int has_float(const header *h)
     return i < h->of->count;
 }
 
-/* Writes it, with memory for the cells. Returns 0 without memory. */
-static int write_all(const header *h, cells *of)
+/* Writes it, with memory for the cells. */
+static void write_all(const header *h, cells *of)
 {
     uint16_t unit;
 
@@ -581,24 +574,24 @@ static int write_all(const header *h, cells *of)
     fprintf(h->out, "\n/* Get and set the value of a field: the number that is in the registers, "
                     "without its scale. An index\n * counts from 0 and is less than the field's "
                     "_COUNT. */\n");
-    if (!for_each_table(h, of, write_functions))
-        return 0;
+    for_each_table(h, of, write_functions);
     fprintf(h->out,
             "\n/* Sets the values of the device file. */\n"
             "static inline void %s_initialise(void)\n{\n",
             h->lower);
-    (void)for_each_table(h, of, write_values);
+    for_each_table(h, of, write_values);
     fprintf(h->out, "}\n#endif\n");
-    return 1;
 }
 
 int header_write_server(header *h)
 {
     cells *of = (cells *)malloc(sizeof *of);
-    const int is_right = of && write_all(h, of);
 
-    free(of);
-    if (!is_right)
+    if (!of) {
         (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
-    return is_right;
+        return 0;
+    }
+    write_all(h, of);
+    free(of);
+    return 1;
 }

@@ -5,10 +5,8 @@
 #include "header.h"
 
 #include "numbers.h"
-#include "report.h"
 
 #include <inttypes.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* A pair of functions on mbm_registers. */
@@ -458,21 +456,14 @@ static int write_getters(const header *h, uint16_t at, const char *name)
 /* Writes the functions of a field. Returns 0 after reporting a refusal. */
 static int write_field(const header *h, uint16_t at)
 {
-    char *name = header_lower(h->fields[at]);
-    int is_right;
+    const char *name = h->lowers[at];
 
-    if (!name) {
-        (void)report(CODE_SYSTEM, REPORT_NO_MEMORY);
-        return 0;
-    }
     fprintf(h->out, "\n/* ");
     header_comment(h->out, h->of->fields[at].name);
     fprintf(h->out, " */");
     write_take(h, at, name);
     write_put(h, at, name);
-    is_right = write_getters(h, at, name);
-    free(name);
-    return is_right;
+    return write_getters(h, at, name);
 }
 
 int header_write_types(const header *h)
