@@ -218,6 +218,11 @@ static const char *check(const conversion *of, decimal_number *number)
                          : say("is not a multiple of step, which is %s", limit_text(&of->step));
 }
 
+int conversion_has_offset(const conversion *of)
+{
+    return of && of->offset.digits != 0;
+}
+
 int conversion_has_limits(const conversion *of)
 {
     return of && (of->has_least || of->has_most || of->has_step);

@@ -38,7 +38,9 @@ uint8_t conversion_print(const value_form *form, const mbm_registers *registers,
 uint16_t conversion_read(const value_form *form, const char *text, size_t length,
                          uint16_t words[VALUE_WORDS], const char **wrong);
 
-/* Whether there are limits of what is written. The conversion may be NULL. */
+/* Whether there is an offset; whether there are limits of what is written. The conversion may be
+ * NULL. */
+int conversion_has_offset(const conversion *of);
 int conversion_has_limits(const conversion *of);
 
 /* Whether a number of a write, as text or in registers, is within the limits of the form. Returns

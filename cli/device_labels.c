@@ -78,7 +78,7 @@ int device_labels_read(yaml_file *file, const yaml_node_t *node, const mbm_planF
                                 value_type_name(planned->type));
     if (field->form.scale.digits != 0 || field->power_name)
         return yaml_file_refuse(file, node, "a field with a scale has no enumeration");
-    if (field->conversion && field->conversion->offset.digits != 0)
+    if (conversion_has_offset(field->conversion))
         return yaml_file_refuse(file, node, "a field with an offset has no enumeration");
     if (field->conversion && field->conversion->has_precision)
         return yaml_file_refuse(file, node, "a field with a precision has no enumeration");

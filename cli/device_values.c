@@ -290,8 +290,7 @@ static const char *check_power(const device *of, uint16_t field, uint16_t power)
         return "has several values";
     if (planned->unit != of->planned[field].unit)
         return "is of another unit";
-    if (one->power_name || one->form.scale.digits != 0 ||
-        (one->conversion && one->conversion->offset.digits != 0))
+    if (one->power_name || one->form.scale.digits != 0 || conversion_has_offset(one->conversion))
         return "has a scale or an offset itself";
     if (!(one->access & DEVICE_READ))
         return "cannot be read";

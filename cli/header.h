@@ -72,6 +72,13 @@ void header_write_limits(FILE *out, const device_field *field);
 void header_write_meaning(FILE *out, const device_field *field, const char *before,
                           const char *after);
 
+/* Begins a part for clients and servers, with a title. `#endif` ends it. */
+void header_begin_shared(const header *h, const char *title);
+
+/* Begins the function that gets the value of a field of a plan: as a double, or times 10^decimals.
+ */
+void header_begin_getter(const header *h, uint16_t at, int is_decimal);
+
 /* Writes the constants of a field's limits. Returns 0 after reporting a refusal. */
 int header_write_limit_constants(header *h, uint16_t at);
 

@@ -15,11 +15,6 @@ int header_is_scaled(const device_field *field)
     return field->form.scale.digits != 0 && !field->power_name;
 }
 
-static int has_offset(const device_field *field)
-{
-    return field->conversion && field->conversion->offset.digits != 0;
-}
-
 /* Whether SunSpec's reserved number is all that its numbers mean: such fields share a constant. */
 static int is_standard_only(const device_field *field)
 {
@@ -56,9 +51,9 @@ void header_write_meaning(FILE *out, const device_field *field, const char *befo
         fputc(')', out);
         before = ", ";
     }
-    if (has_offset(field))
+    if (conversion_has_offset(field->conversion))
         header_write_number(out, say("%splus ", before), &field->conversion->offset);
-    if (field->power_name || has_offset(field))
+    if (field->power_name || conversion_has_offset(field->conversion))
         fputs(after, out);
 }
 
@@ -160,11 +155,18 @@ static int write_constant(const header *h, uint16_t at, const char *lower)
     return 1;
 }
 
+void header_begin_getter(const header *h, uint16_t at, int is_decimal)
+{
+    fprintf(h->out, "\nstatic inline uint8_t %s_%s_%s(const mbm_plan *plan, %s%s *value)\n{\n",
+            h->lower, h->lowers[at], is_decimal ? "decimal" : "number",
+            device_values_in(&h->of->planned[at]) > 1 ? "uint16_t index, " : "",
+            is_decimal ? "uint8_t decimals, int32_t" : "double");
+}
+
 /* Writes the functions that get the values of a field; `with` is the name of its conversion. */
 static void write_getters(const header *h, uint16_t at, const char *lower, const char *with)
 {
     const mbm_planField *planned = &h->of->planned[at];
-    const int is_several = device_values_in(planned) > 1;
     int is_decimal;
 
     if (planned->type == MBM_TYPE_TEXT) {
@@ -174,15 +176,13 @@ static void write_getters(const header *h, uint16_t at, const char *lower, const
                 h->lower, lower, h->upper, h->fields[at], h->lower, with);
         return;
     }
-    for (is_decimal = 0; is_decimal <= (planned->type <= MBM_TYPE_INT32); is_decimal++)
-        fprintf(h->out,
-                "\nstatic inline uint8_t %s_%s_%s(const mbm_plan *plan, %s%s *value)\n{\n"
-                "    return mbm_plan_%s(plan, %s_%s, %s, &%s_%s, %svalue);\n}\n",
-                h->lower, lower, is_decimal ? "decimal" : "number",
-                is_several ? "uint16_t index, " : "",
-                is_decimal ? "uint8_t decimals, int32_t" : "double",
+    for (is_decimal = 0; is_decimal <= (planned->type <= MBM_TYPE_INT32); is_decimal++) {
+        header_begin_getter(h, at, is_decimal);
+        fprintf(h->out, "    return mbm_plan_%s(plan, %s_%s, %s, &%s_%s, %svalue);\n}\n",
                 is_decimal ? "getDecimal" : "getConverted", h->upper, h->fields[at],
-                is_several ? "index" : "0", h->lower, with, is_decimal ? "decimals, " : "");
+                device_values_in(planned) > 1 ? "index" : "0", h->lower, with,
+                is_decimal ? "decimals, " : "");
+    }
 }
 
 static int write_field(const header *h, uint16_t at)

@@ -26,6 +26,14 @@ void header_write_limits(FILE *out, const device_field *field)
                             &of->step);
 }
 
+int header_is_checked(const header *h, uint16_t at)
+{
+    const device_field *field = &h->of->fields[at];
+
+    /* With a power of ten in another field the registers' number is not known here. */
+    return conversion_has_limits(field->conversion) && !field->power_name;
+}
+
 /* --- constants --- */
 
 /* A whole number, and whether something of the same sign is beyond it. */
@@ -175,12 +183,10 @@ static int has_base(const header *h, uint16_t at)
 
 int header_write_limit_constants(header *h, uint16_t at)
 {
-    const device_field *field = &h->of->fields[at];
-    const conversion *of = field->conversion;
+    const conversion *of = h->of->fields[at].conversion;
     const int is_turned = h->scales[at].multiplier < 0;
 
-    /* With a power of ten in another field the registers' number is not known here. */
-    if (!conversion_has_limits(of) || field->power_name)
+    if (!header_is_checked(h, at))
         return 1;
     return (!of->has_least ||
             write_limit(h, at, is_turned ? "_MAX" : "_MIN", &of->least, is_turned ? -1 : 1)) &&
@@ -292,13 +298,6 @@ static void write_step(const header *h, uint16_t at, const limits *of)
     fprintf(h->out, " %% (uint%u_t)%s_%s_STEP == 0", wide, upper, name);
 }
 
-int header_is_checked(const header *h, uint16_t at)
-{
-    const device_field *field = &h->of->fields[at];
-
-    return conversion_has_limits(field->conversion) && !field->power_name;
-}
-
 /* Writes the function that checks a number. */
 static void write_check(const header *h, uint16_t at)
 {
@@ -339,11 +338,8 @@ void header_write_checks(const header *h)
         if (!header_is_checked(h, i))
             continue;
         if (is_first)
-            fprintf(h->out,
-                    "\n/* ==== Limits: whether a number, as the registers have it, may be written: "
-                    "MBM_OK, or\n * MBM_OUT_OF_RANGE. ==== */\n\n"
-                    "#if defined(%s_PLAN) || defined(%s_SERVER)\n#include \"mbm.h\"\n",
-                    h->upper, h->upper);
+            header_begin_shared(h, "Limits: whether a number, as the registers have it, may be "
+                                   "written: MBM_OK, or\n * MBM_OUT_OF_RANGE.");
         is_first = 0;
         write_check(h, i);
     }

@@ -53,6 +53,14 @@ void header_place(const header *h, const mbm_planField *planned)
                 device_address_text(h->of, planned->table, planned->address + size - 1));
 }
 
+void header_begin_shared(const header *h, const char *title)
+{
+    fprintf(h->out,
+            "\n/* ==== %s ==== */\n\n"
+            "#if defined(%s_PLAN) || defined(%s_SERVER)\n#include \"mbm.h\"\n",
+            title, h->upper, h->upper);
+}
+
 const char *header_type(const mbm_planField *planned)
 {
     static const char *const TYPES[] = {"",         "uint8_t", "uint16_t", "int16_t",

@@ -323,8 +323,7 @@ static int is_converted(const device_field *field, const mbm_planField *planned)
 {
     return !value_is_text(planned->type) && !value_is_date(planned->type) &&
            (header_is_scaled(field) || field->power_name || listed(field) > 0 ||
-            is_standard(field, planned) ||
-            (field->conversion && field->conversion->offset.digits != 0));
+            is_standard(field, planned) || conversion_has_offset(field->conversion));
 }
 
 /* Whether all numbers of a type have 32 bits. */
@@ -429,7 +428,6 @@ static void write_fetch(const header *h, uint16_t at, const char *name)
 static int write_getters(const header *h, uint16_t at, const char *name)
 {
     const mbm_planField *planned = &h->of->planned[at];
-    const char *index = device_values_in(planned) > 1 ? "index, " : "";
     int is_decimal;
 
     if (at >= h->of->readable || !is_converted(&h->of->fields[at], planned))
@@ -438,17 +436,17 @@ static int write_getters(const header *h, uint16_t at, const char *name)
     if (!write_as(h, at, name))
         return 0;
     write_fetch(h, at, name);
-    for (is_decimal = 0; is_decimal <= is_short(planned->type); is_decimal++)
+    for (is_decimal = 0; is_decimal <= is_short(planned->type); is_decimal++) {
+        header_begin_getter(h, at, is_decimal);
         fprintf(h->out,
-                "\nstatic inline uint8_t %s_%s_%s(const mbm_plan *plan, %s%s *value)\n{\n"
                 "    uint16_t words[5];\n    mbm_registers own;\n"
                 "    const uint8_t status = %s_fetch_%s(plan, %swords, &own);\n\n"
                 "    return status != MBM_OK ? status : mbm_registers_%s(&own, %s_%s_as, 0, 0, "
                 "&%s_%s_conversion, %svalue);\n}\n",
-                h->lower, name, is_decimal ? "decimal" : "number", *index ? "uint16_t index, " : "",
-                is_decimal ? "uint8_t decimals, int32_t" : "double", h->lower, name, index,
+                h->lower, name, device_values_in(planned) > 1 ? "index, " : "",
                 is_decimal ? "getDecimal" : "getConverted", h->lower, name, h->lower, name,
                 is_decimal ? "decimals, " : "");
+    }
     fprintf(h->out, "#endif\n");
     return 1;
 }
@@ -474,12 +472,9 @@ int header_write_types(const header *h)
         count = (uint16_t)(count + header_is_special(&h->of->planned[i]));
     if (count == 0)
         return 1;
-    fprintf(h->out,
-            "\n/* ==== Values that have functions of mbm/values.h. Take one out of registers, such "
-            "as those of\n * mbm_plan_getRegisters, or put one into them. They return a status. "
-            "==== */\n\n"
-            "#if defined(%s_PLAN) || defined(%s_SERVER)\n#include \"mbm.h\"\n",
-            h->upper, h->upper);
+    header_begin_shared(h, "Values that have functions of mbm/values.h. Take one out of registers, "
+                           "such as those of\n * mbm_plan_getRegisters, or put one into them. They "
+                           "return a status.");
     write_helpers(h);
     for (i = 0; i < h->of->count; i++)
         if (header_is_special(&h->of->planned[i]) && !write_field(h, i))
