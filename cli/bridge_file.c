@@ -271,7 +271,7 @@ static int read_reach(yaml_file *file, const yaml_node_t *node, const yaml_node_
 
     if (!reach_read_nodes(file, values, &own))
         return 0;
-    reach_fit(&rest, &has);
+    (void)reach_fit(&rest, &has);
     reach_fill(&into->reach, &own);
     reach_fill(&into->reach, &rest);
     wrong = reach_check(&into->reach, &has, "");

@@ -127,7 +127,7 @@ const char *gateway_setup_reach(gateway_setup *to, unsigned index, const reach *
     reach own = *more;
 
     /* What the lines share is for those that can have it. */
-    reach_fit(&own, &has);
+    (void)reach_fit(&own, &has);
     reach_fill(&to->lines[index].place.reach, &own);
     return reach_check(&to->lines[index].place.reach, &has, dash);
 }

@@ -307,7 +307,7 @@ void line_reach(line *l, const reach *what)
     const reach_line has = place_reach(&l->place, 1);
 
     l->place.reach = *what;
-    reach_fit(&l->place.reach, &has);
+    (void)reach_fit(&l->place.reach, &has);
     l->received.accept = l->place.reach.accept;
     reach_set(&l->place.reach, &l->client, has.has_link ? &l->kept : NULL, &has,
               l->place.has_gap ? l->place.gapMs * 1000 : 0);
@@ -319,8 +319,7 @@ const char *line_add_reach(place *where, const reach *of_device, uint32_t in_fli
     const reach_line has = place_reach(where, in_flight);
     reach own = *of_device;
 
-    *lost = reach_lost(&own, &has);
-    reach_fit(&own, &has);
+    *lost = reach_fit(&own, &has);
     reach_fill(&where->reach, &options.reach);
     reach_fill(&where->reach, &own);
     return reach_check(&where->reach, &has, "");

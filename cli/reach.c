@@ -227,29 +227,29 @@ static void forget(reach *of, int key)
     of->given = (uint16_t)(of->given & ~(1u << key));
 }
 
-const char *reach_lost(const reach *of, const reach_line *line)
+const char *reach_fit(reach *of, const reach_line *line)
 {
-    if (of->accept && line->framing != MBM_FRAMING_TCP)
-        return "accept has no effect here: it is for frames of Modbus TCP, in others nothing but "
-               "the unit tells whose a reply is";
-    if (of->is_lenient && line->framing == MBM_FRAMING_ASCII)
-        return "lenient has no effect in ASCII frames";
-    if ((of->delayMs > 0 || of->close) && !line->has_link)
-        return say("%s has no effect on udp://, which has no connection",
-                   of->delayMs > 0 ? "delay" : "close");
-    return NULL;
-}
+    const char *lost = NULL;
 
-void reach_fit(reach *of, const reach_line *line)
-{
-    if (line->framing != MBM_FRAMING_TCP)
-        forget(of, REACH_ACCEPT);
-    if (line->framing == MBM_FRAMING_ASCII)
-        forget(of, REACH_LENIENT);
     if (!line->has_link) {
+        if (of->delayMs > 0 || of->close)
+            lost = say("%s has no effect on udp://, which has no connection",
+                       of->delayMs > 0 ? "delay" : "close");
         forget(of, REACH_DELAY);
         forget(of, REACH_CLOSE);
     }
+    if (line->framing == MBM_FRAMING_ASCII) {
+        if (of->is_lenient)
+            lost = "lenient has no effect in ASCII frames";
+        forget(of, REACH_LENIENT);
+    }
+    if (line->framing != MBM_FRAMING_TCP) {
+        if (of->accept)
+            lost = "accept has no effect here: it is for frames of Modbus TCP, in others nothing "
+                   "but the unit tells whose a reply is";
+        forget(of, REACH_ACCEPT);
+    }
+    return lost;
 }
 
 /* A reply with another transaction number may be a late one, unless the connection is a new one. */

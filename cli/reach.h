@@ -83,10 +83,9 @@ typedef struct reach_line {
  * `dash` is before the names: "--", or nothing. */
 const char *reach_check(const reach *of, const reach_line *line, const char *dash);
 
-/* Returns NULL, or what a device file says that the line cannot have; and leaves that out: the same
- * device may be on a line that can. */
-const char *reach_lost(const reach *of, const reach_line *line);
-void reach_fit(reach *of, const reach_line *line);
+/* Leaves out what the line cannot have: a device file may say it, since the same device may be on a
+ * line that can. Returns NULL, or a sentence about one of the keys that have no effect then. */
+const char *reach_fit(reach *of, const reach_line *line);
 
 /* Sets client and link; NULL for no link. `gapUs` is the gap of a serial line, 0: t3.5. */
 void reach_set(const reach *of, mbm_client *client, mbm_link *link, const reach_line *line,
