@@ -10,9 +10,14 @@
 
 const char *const device_functions[] = {"single", "multiple", NULL};
 
+int device_is_of_bits(uint8_t table)
+{
+    return table <= MBM_TABLE_DISCRETE_INPUTS;
+}
+
 int device_is_part(const mbm_planField *planned)
 {
-    return planned->type == MBM_TYPE_BIT && planned->table >= MBM_TABLE_HOLDING_REGISTERS;
+    return planned->type == MBM_TYPE_BIT && !device_is_of_bits(planned->table);
 }
 
 int device_is_wide_part(const mbm_planField *planned)
@@ -163,7 +168,7 @@ const char *device_address_text(const device *of, uint8_t table, uint32_t addres
 
 uint16_t device_most_written(const device *of, uint8_t table)
 {
-    const int is_bits = table <= MBM_TABLE_DISCRETE_INPUTS;
+    const int is_bits = device_is_of_bits(table);
     const uint16_t own = is_bits ? of->limits.write_bits : of->limits.write_registers;
 
     return own ? own : is_bits ? MBM_MAX_WRITE_BITS : MBM_MAX_WRITE_REGISTERS;

@@ -88,6 +88,9 @@ int device_find(const device *from, const char *topic);
  * the registers; the value of bits is their number. */
 const char *device_label_of(const device *from, uint16_t field, const uint16_t *words);
 
+/* Whether a table has bits, and not registers. */
+int device_is_of_bits(uint8_t table);
+
 /* Returns how many registers or bits a field has. */
 uint32_t device_size(const mbm_planField *planned);
 

@@ -139,7 +139,7 @@ static int read_type(yaml_file *file, const yaml_node_t *field, const yaml_node_
                      mbm_planField *planned, device_field *into)
 {
     const device_type_keys keys = keys_of_type(values);
-    const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
+    const int is_bits = device_is_of_bits(planned->table);
 
     if (!values[TYPE] && !is_bits)
         return yaml_file_refuse(file, field, "the field has no key type");
@@ -162,7 +162,7 @@ static int read_size(yaml_file *file, const yaml_node_t *field, const yaml_node_
                      const device *of, mbm_planField *planned)
 {
     uint32_t bit = 0, count = 1, size;
-    const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
+    const int is_bits = device_is_of_bits(planned->table);
 
     if (value_is_text(planned->type) && !values[COUNT])
         return yaml_file_refuse(file, field, "a text needs its number of characters as count");

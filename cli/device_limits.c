@@ -157,7 +157,7 @@ static int check_read(yaml_file *file, const yaml_node_t *node, const device *of
                       const mbm_planField *planned)
 {
     const device_limits *limits = &of->limits;
-    const int is_bits = planned->table <= MBM_TABLE_DISCRETE_INPUTS;
+    const int is_bits = device_is_of_bits(planned->table);
     const uint16_t most = is_bits ? limits->read_bits : limits->read_registers;
     const uint32_t size = device_size(planned), last = planned->address + size - 1;
     int i;

@@ -52,6 +52,13 @@ int device_plan_is_refused(uint8_t status)
     return status == MBM_ILLEGAL_DATA_ADDRESS || status == MBM_ILLEGAL_DATA_VALUE;
 }
 
+int device_plan_covers(const mbm_planReadInfo *read, const mbm_planField *planned)
+{
+    return read->unit == planned->unit && read->table == planned->table &&
+           read->intervalMs == planned->intervalMs && read->address <= planned->address &&
+           (uint32_t)read->address + read->quantity >= planned->address + device_size(planned);
+}
+
 void device_plan_free(mbm_planSetup *setup)
 {
     free((void *)(uintptr_t)setup->fields);

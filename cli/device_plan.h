@@ -25,6 +25,9 @@ int device_plan_is_refused(uint8_t status);
  * sentence without its full stop, as device_plan_wrong. */
 const char *device_plan_check(const device *of, const char *path, uint8_t framing);
 
+/* Whether a read of a plan covers all of a field. */
+int device_plan_covers(const mbm_planReadInfo *read, const mbm_planField *planned);
+
 /* Begins a plan on a client that has no line, to see what the library makes of the fields. Returns
  * the status of mbm_plan_begin, which sets `wrong`. The caller ends the plan; another trial may
  * begin then. */

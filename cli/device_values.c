@@ -107,7 +107,7 @@ static int read_limit(yaml_file *file, const char *key, const yaml_node_t *node,
     const char *text;
 
     if (value_is_text(planned->type) || value_is_date(planned->type) ||
-        (is_bit(planned) && planned->count == 1) || planned->table <= MBM_TABLE_DISCRETE_INPUTS)
+        (is_bit(planned) && planned->count == 1) || device_is_of_bits(planned->table))
         return yaml_file_refuse(file, node, "a %s has no %s", value_type_name(planned->type), key);
     if (!(field->access & DEVICE_WRITE))
         return yaml_file_refuse(file, node,
@@ -208,7 +208,7 @@ static int read_not_available(yaml_file *file, const yaml_node_t *node, int is_s
 
     if (!node || is_none(node))
         return 1;
-    if (planned->table <= MBM_TABLE_DISCRETE_INPUTS || (is_bit(planned) && planned->count == 1))
+    if (device_is_of_bits(planned->table) || (is_bit(planned) && planned->count == 1))
         return is_shared || yaml_file_refuse(file, node, "a bit has no not_available");
     if (is_list)
         count = yaml_file_items(file, "not_available", node, CONVERSION_NUMBERS);

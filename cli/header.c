@@ -310,14 +310,6 @@ static int find_scales(header *h)
 
 /* --- the plan --- */
 
-/* Whether a read covers a field, and nothing of it is elsewhere. */
-static int covers(const mbm_planReadInfo *read, const mbm_planField *field)
-{
-    return read->unit == field->unit && read->table == field->table &&
-           read->intervalMs == field->intervalMs && read->address <= field->address &&
-           (uint32_t)read->address + read->quantity >= field->address + device_size(field);
-}
-
 /* Appends to `order` the fields that a read covers and no read before it had, sorted by address.
  * Returns the new number of fields there. */
 static uint16_t take_fields(const header *h, const mbm_planReadInfo *read, uint16_t taken,
@@ -328,7 +320,7 @@ static uint16_t take_fields(const header *h, const mbm_planReadInfo *read, uint1
     uint16_t i, place;
 
     for (i = 0; i < h->of->readable; i++) {
-        if (is_taken[i] || !covers(read, &h->of->planned[i]))
+        if (is_taken[i] || !device_plan_covers(read, &h->of->planned[i]))
             continue;
         is_taken[i] = 1;
         for (place = taken++; place > first; place--) {
@@ -360,8 +352,7 @@ static int note_reads(header *h, const mbm_plan *plan)
 
         taken = take_fields(h, &read, taken, is_taken);
         h->counts[h->reads] = (uint16_t)(taken - before);
-        words +=
-            read.table <= MBM_TABLE_DISCRETE_INPUTS ? (read.quantity + 15u) / 16 : read.quantity;
+        words += device_is_of_bits(read.table) ? (read.quantity + 15u) / 16 : read.quantity;
     }
     h->words = (uint16_t)words;
     free(is_taken);

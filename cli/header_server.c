@@ -34,11 +34,6 @@ typedef struct cells {
 static const char *const NAMES[] = {"", "coils", "discrete", "holding", "input"};
 
 /* Whether the table has bits, and not registers. */
-static int is_bits(uint8_t table)
-{
-    return table <= MBM_TABLE_DISCRETE_INPUTS;
-}
-
 /* --- cells --- */
 
 /* Adds a part; the two that are nearest become one if there are too many. */
@@ -70,7 +65,7 @@ static void add_part(cells *of, uint32_t first, uint32_t last)
 /* Finds the cells of a table of a unit. */
 static void find_cells(const header *h, uint16_t unit, uint8_t table, cells *into)
 {
-    const uint32_t hole = is_bits(table) ? BIT_HOLE : HOLE;
+    const uint32_t hole = device_is_of_bits(table) ? BIT_HOLE : HOLE;
     uint32_t at;
     uint16_t i;
 
@@ -235,12 +230,12 @@ static void write_part(const header *h, const cells *of, int part)
 
     fprintf(h->out, "\n/* %s%s: addresses %u to %u */\nstatic %s %s[%u];\n", NAMES[of->table],
             h->unit == 0 ? say(" of unit %u", of->unit) : "", (unsigned)first,
-            (unsigned)of->last[part], is_bits(of->table) ? "uint8_t" : "uint16_t", name,
-            (unsigned)(is_bits(of->table) ? (size + 7) / 8 : size));
+            (unsigned)of->last[part], device_is_of_bits(of->table) ? "uint8_t" : "uint16_t", name,
+            (unsigned)(device_is_of_bits(of->table) ? (size + 7) / 8 : size));
     has_holes = write_valid(h, of, part);
     fprintf(h->out,
             "static mbm_%sTable %s_table = {\n    MBM_INIT, %s, %s%s, MBM_INIT, %uu, %uu};\n",
-            is_bits(of->table) ? "bit" : "register", name, name, has_holes ? name : "",
+            device_is_of_bits(of->table) ? "bit" : "register", name, name, has_holes ? name : "",
             has_holes ? "_valid" : "NULL", (unsigned)first, (unsigned)size);
 }
 
@@ -256,7 +251,7 @@ static void write_serve(const header *h, const cells *of, int part, int is_guard
             is_first ? "" : "    if (status == MBM_OK)\n        status = other;\n");
     if (is_guarded)
         fprintf(h->out, "    (void)mbm_%sTable_setHooks(&%s_table, &%s_hooks);\n",
-                is_bits(of->table) ? "bit" : "register", name, name);
+                device_is_of_bits(of->table) ? "bit" : "register", name, name);
 }
 
 /* Writes the tables of a unit and the function that serves them. */
@@ -494,7 +489,7 @@ static void write_functions(const header *h, const cells *of)
 static int needs_swap(const mbm_planField *planned)
 {
     return is_swapped(planned) && planned->type < MBM_TYPE_DOUBLE && !header_is_special(planned) &&
-           !(planned->type == MBM_TYPE_BIT && is_bits(planned->table));
+           !(planned->type == MBM_TYPE_BIT && device_is_of_bits(planned->table));
 }
 
 /* Writes the function that swaps bytes, if one of those needs it. */
@@ -516,7 +511,7 @@ static void write_swap(const header *h)
 /* Writes the assignments of the file's values to the cells of a table. */
 static void write_values(const header *h, const cells *of)
 {
-    const uint32_t step = is_bits(of->table) ? 8 : 1;
+    const uint32_t step = device_is_of_bits(of->table) ? 8 : 1;
     uint32_t at, bit;
     int part;
 

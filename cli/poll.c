@@ -275,22 +275,52 @@ static int answers_others(polling *p, uint16_t unit)
     return 0;
 }
 
-static int is_bits(uint8_t table)
-{
-    return table <= MBM_TABLE_DISCRETE_INPUTS;
-}
-
 /* Finds the request of a field. Returns 0 if there is none. */
 static int find_read(const polling *p, const mbm_planField *planned, mbm_planReadInfo *read)
 {
     uint16_t i;
 
     for (i = 0; mbm_plan_getRead(&p->read.plan, i, read) == MBM_OK; i++)
-        if (read->unit == planned->unit && read->table == planned->table &&
-            read->intervalMs == planned->intervalMs && planned->address >= read->address &&
-            planned->address < (uint32_t)read->address + read->quantity)
+        if (device_plan_covers(read, planned))
             return 1;
     return 0;
+}
+
+/* What to look at if a field has no reply: its request may be too long. */
+static const char *advise_on_silence(polling *p, const mbm_planField *planned,
+                                     const char *otherwise)
+{
+    mbm_planReadInfo read;
+    int is_bits;
+
+    if (!answers_others(p, planned->unit) || !find_read(p, planned, &read) || read.quantity <= 16)
+        return otherwise;
+    is_bits = device_is_of_bits(read.table);
+    return say("It answers other requests. Some devices do not answer a read of more %s than they "
+               "can send, here %u: try %s in the file",
+               is_bits ? "bits" : "registers", read.quantity,
+               is_bits ? "max_read_bits" : "max_read_registers");
+}
+
+/* What to look at if the device does not have the address of a field. */
+static const char *advise_on_address(const polling *p, const mbm_planField *planned,
+                                     const char *otherwise)
+{
+    const int is_on_wire = p->read.meter.notation == DEVICE_ON_WIRE;
+    const char *advice =
+        is_on_wire ? otherwise
+                   : "Check table, address and type in the file against the device's manual";
+    uint16_t address;
+    const uint8_t table =
+        is_on_wire ? advice_manual(planned->table, planned->address, &address) : 0;
+
+    if (table != 0)
+        return say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\", or "
+                   "\"notation: modicon\" if the whole file has such addresses",
+                   planned->address, address, value_table_names[table], address);
+    return p->read.setup.registerGap | p->read.setup.bitGap
+               ? say("%s. Try without %s", advice, p->gap > 0 ? "--gap" : "gap in the file")
+               : advice;
 }
 
 /* Says how the first failure came about, and what to look at. An exception is about a field, other
@@ -302,33 +332,16 @@ static void report_first_failure(polling *p)
     const mbm_planField *planned = &p->read.meter.planned[p->first_failure.field];
     const device_field *field = &p->read.meter.fields[p->first_failure.field];
     const char *advice = advice_on(&p->read.at.place, ADVICE_FILE, status, exception, why);
-    mbm_planReadInfo read = {0};
     char who[200];
-    uint16_t address;
-    uint8_t table;
 
     snprintf(who, sizeof who, "unit %u", planned->unit);
     if (exception != 0)
         snprintf(who, sizeof who, "unit %u, field %.100s in line %d of the file", planned->unit,
                  field->name, field->line);
-    table = p->read.meter.notation == DEVICE_ON_WIRE
-                ? advice_manual(planned->table, planned->address, &address)
-                : 0;
-    if (status == MBM_RESPONSE_TIMED_OUT && !why && answers_others(p, planned->unit) &&
-        find_read(p, planned, &read) && read.quantity > 16)
-        advice = say("It answers other requests. Some devices do not answer a read of more %s than "
-                     "they can send, here %u: try %s in the file",
-                     is_bits(read.table) ? "bits" : "registers", read.quantity,
-                     is_bits(read.table) ? "max_read_bits" : "max_read_registers");
-    if (exception == MBM_ILLEGAL_DATA_ADDRESS && p->read.meter.notation != DEVICE_ON_WIRE)
-        advice = "Check table, address and type in the file against the device's manual";
-    if (exception == MBM_ILLEGAL_DATA_ADDRESS && table != 0)
-        advice = say("In a manual, %u is address %u: write \"table: %s\" and \"address: %u\", or "
-                     "\"notation: modicon\" if the whole file has such addresses",
-                     planned->address, address, value_table_names[table], address);
-    else if (exception == MBM_ILLEGAL_DATA_ADDRESS &&
-             (p->read.setup.registerGap | p->read.setup.bitGap))
-        advice = say("%s. Try without %s", advice, p->gap > 0 ? "--gap" : "gap in the file");
+    if (status == MBM_RESPONSE_TIMED_OUT && !why)
+        advice = advise_on_silence(p, planned, advice);
+    if (exception == MBM_ILLEGAL_DATA_ADDRESS)
+        advice = advise_on_address(p, planned, advice);
     (void)report_failure(who, status, exception, reach_timeout(&p->read.at.place.reach), why,
                          advice);
 }

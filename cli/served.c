@@ -146,7 +146,7 @@ static uint8_t before_write(void *context, const mbm_access *access)
 /* Makes the cells of a table. Returns 0, or -1 without memory. */
 static int make_cells(served_units *units, uint8_t unit, uint8_t table, enum served_kind kind)
 {
-    const int is_bit = table <= MBM_TABLE_DISCRETE_INPUTS;
+    const int is_bit = device_is_of_bits(table);
     served_cells *cells = &units->cells[unit][table - 1];
 
     cells->kind = kind;
@@ -299,7 +299,7 @@ int served_make_device(served_units *units, const device *from, const uint8_t *i
     units->from = from;
     for (i = 0; i < count; i++)
         for (table = MBM_TABLE_COILS; table <= MBM_TABLE_INPUT_REGISTERS; table++) {
-            const int is_bits = table <= MBM_TABLE_DISCRETE_INPUTS;
+            const int is_bits = device_is_of_bits(table);
             served_cells *cells = &units->cells[i][table - 1];
 
             cells->most_read = is_bits ? from->limits.read_bits : from->limits.read_registers;
