@@ -47,16 +47,18 @@ void import_lose(import *j, int line, const char *what, const char *why, ...)
 /* Names each key of a map that nothing has looked up. `of` says of what: "sensor Voltage". */
 void import_lose_rest(import *j, const tree *map, const char *of);
 
-/* Words of theirs and the words of the device file for them; NULL ends them. */
+/* A word of the other program, and the word of the device file that means the same. The last of an
+ * array has NULL for both. */
 typedef struct import_words {
     const char *theirs, *ours;
 } import_words;
 
-/* Returns our word for one of theirs, or NULL. */
+/* Returns the device file's word for a word of the other program; NULL if it has none. */
 const char *import_word(const import_words *words, const char *theirs);
 
-/* Set the name of the line, as the command line of mbm has it: any, or that of a serial one, with
- * the frames rtu or ascii. Of the parity and the data bits the first letter and digit count. */
+/* Set the name of the line, as the command line of mbm has it. import_line takes any name.
+ * import_serial_line makes that of a serial line: `frames` is rtu or ascii, and only the first
+ * character of `parity` and of `data` counts. */
 void import_line(import *j, const char *name, ...) __attribute__((format(printf, 2, 3)));
 void import_serial_line(import *j, const char *frames, const char *path, const char *baud,
                         const char *parity, const char *stop, const char *data);

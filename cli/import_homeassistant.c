@@ -34,14 +34,6 @@ static unsigned registers_of(const char *type)
                                                                : 1;
 }
 
-/* The line of a key, or that of its map. */
-static int line_of(const tree *map, const char *key)
-{
-    const tree *found = tree_peek(map, key);
-
-    return found ? found->line : map->line;
-}
-
 static int is_true(const char *text)
 {
     return text && (strcasecmp(text, "true") == 0 || strcasecmp(text, "yes") == 0 ||
@@ -61,12 +53,12 @@ static unsigned begin(import *j, tree *entity, const char *more)
     /* Home Assistant knows an entity by it; mbm makes one of its own. */
     (void)tree_find(entity, "unique_id");
     if (unit)
-        import_set(j, field, line_of(entity, "slave"), "unit", "%s", unit);
+        import_set(j, field, tree_line(entity, "slave"), "unit", "%s", unit);
     if (interval && strcmp(interval, "0") == 0)
-        import_lose(j, line_of(entity, "scan_interval"), import_name(j, field),
+        import_lose(j, tree_line(entity, "scan_interval"), import_name(j, field),
                     "scan_interval 0, which is no polling, is not taken over");
     else if (interval)
-        import_set(j, field, line_of(entity, "scan_interval"), "interval", "%ss", interval);
+        import_set(j, field, tree_line(entity, "scan_interval"), "interval", "%ss", interval);
     return field;
 }
 
@@ -82,7 +74,7 @@ static void copy_key(import *j, unsigned field, tree *entity, const char *theirs
     const char *text = tree_text(entity, theirs, NULL);
 
     if (text)
-        import_set_text(j, field, line_of(entity, theirs), ours, text);
+        import_set_text(j, field, tree_line(entity, theirs), ours, text);
 }
 
 /* Copies a number as it is: YAML of Home Assistant has them as 0.1, 1e-3 and "0.1". */
@@ -93,7 +85,7 @@ static void copy_number(import *j, unsigned field, tree *entity, const char *the
     char *end;
 
     if (text && (strtod(text, &end) != neutral || *end))
-        import_set(j, field, line_of(entity, theirs), ours, "%s", text);
+        import_set(j, field, tree_line(entity, theirs), ours, "%s", text);
 }
 
 /* --- values in registers --- */
@@ -108,7 +100,7 @@ static const char *type_of(import *j, tree *entity, const char *name)
     if (type && strcmp(type, "custom") == 0)
         type = structure ? import_word(STRUCTURES, structure) : NULL;
     if (!type)
-        import_lose(j, line_of(entity, structure ? "structure" : "data_type"), name,
+        import_lose(j, tree_line(entity, structure ? "structure" : "data_type"), name,
                     "the data_type %s%s%s has no counterpart: the field is left out", theirs,
                     structure ? " " : "", structure ? structure : "");
     return type;
@@ -121,22 +113,22 @@ static int set_value(import *j, unsigned field, tree *entity, const char *scale,
     const char *name = import_name(j, field), *type = type_of(j, entity, name);
     const char *swap = tree_text(entity, "swap", "none"), *order = import_word(ORDERS, swap);
     const char *count = tree_text(entity, "count", NULL);
-    const int line = line_of(entity, "count");
+    const int line = tree_line(entity, "count");
 
     if (!type)
         return 0;
-    import_set(j, field, line_of(entity, "data_type"), "type", "%s", type);
+    import_set(j, field, tree_line(entity, "data_type"), "type", "%s", type);
     if (strcmp(type, "text") == 0)
         import_set(j, field, line, "count", "%lu", 2 * strtoul(count ? count : "1", NULL, 10));
     else if (count && strtoul(count, NULL, 10) != registers_of(type))
         import_lose(j, line, name, "count %s is not the %u registers of %s", count,
                     registers_of(type), type);
     if (order && *order)
-        import_set(j, field, line_of(entity, "swap"), "order", "%s", order);
+        import_set(j, field, tree_line(entity, "swap"), "order", "%s", order);
     copy_number(j, field, entity, scale, "scale", 1);
     copy_number(j, field, entity, offset, "offset", 0);
     if (precision)
-        import_set(j, field, line_of(entity, "precision"), "precision", "%s", precision);
+        import_set(j, field, tree_line(entity, "precision"), "precision", "%s", precision);
     return 1;
 }
 
@@ -184,7 +176,7 @@ static void import_sensor(import *j, tree *entity)
     copy_key(j, field, entity, "device_class", "device_class");
     copy_key(j, field, entity, "state_class", "state_class");
     if (nan)
-        import_set(j, field, line_of(entity, "nan_value"), "not_available", "[%s]", nan);
+        import_set(j, field, tree_line(entity, "nan_value"), "not_available", "[%s]", nan);
     set_repetition(j, field, entity, every_of(j, field));
     import_lose_rest(j, entity, import_name(j, field));
 }
@@ -252,7 +244,7 @@ static void import_switch(import *j, tree *entity)
     /* Without this key Home Assistant does not read it. */
     import_set(j, field, entity->line, "access", verify ? "read-write" : "write");
     if (strcmp(write_type, "holdings") == 0 || strcmp(write_type, "coils") == 0)
-        import_set(j, field, line_of(entity, "write_type"), "write_function", "multiple");
+        import_set(j, field, tree_line(entity, "write_type"), "write_function", "multiple");
     if (strcmp(table, "holding") == 0)
         set_on_off(j, field, entity->line, off, on);
     else
@@ -351,11 +343,11 @@ static void import_setpoint(import *j, tree *entity, const char *degrees)
     }
     import_set(j, field, target->line, "access", "read-write");
     import_set_text(j, field, target->line, "unit_of_measurement", degrees);
-    import_set(j, field, line_of(entity, "min_temp"), "min_value", "%s",
+    import_set(j, field, tree_line(entity, "min_temp"), "min_value", "%s",
                tree_text(entity, "min_temp", "5"));
-    import_set(j, field, line_of(entity, "max_temp"), "max_value", "%s",
+    import_set(j, field, tree_line(entity, "max_temp"), "max_value", "%s",
                tree_text(entity, "max_temp", "35"));
-    import_set(j, field, line_of(entity, "temp_step"), "step", "%s",
+    import_set(j, field, tree_line(entity, "temp_step"), "step", "%s",
                tree_text(entity, "temp_step", "0.5"));
     if (is_true(tree_text(entity, "target_temp_write_registers", NULL)))
         import_set(j, field, target->line, "write_function", "multiple");
@@ -402,7 +394,7 @@ static void import_climate(import *j, tree *entity)
     import_setpoint(j, entity, degrees);
     import_switched(j, entity);
     if (is_true(tree_text(entity, "write_registers", NULL)))
-        import_lose(j, line_of(entity, "write_registers"), name,
+        import_lose(j, tree_line(entity, "write_registers"), name,
                     "write_registers: say \"write_function: multiple\" where the device needs it");
     import_modes(j, entity, "hvac_mode_register", " mode", "read-write");
     import_modes(j, entity, "hvac_action_register", " action", "read");
@@ -452,10 +444,10 @@ static void import_timeout(import *j, tree *hub)
     char time[32];
 
     if (seconds >= 0.001 && seconds <= 1000)
-        import_set(j, IMPORT_HEAD, line_of(hub, "timeout"), "timeout", "%s",
+        import_set(j, IMPORT_HEAD, tree_line(hub, "timeout"), "timeout", "%s",
                    number_time_text((uint32_t)(seconds * 1000 + 0.5), time));
     else
-        import_lose(j, line_of(hub, "timeout"), "timeout", "a timeout is from 1ms to 1000s");
+        import_lose(j, tree_line(hub, "timeout"), "timeout", "a timeout is from 1ms to 1000s");
 }
 
 static void import_hub(import *j, tree *hub)
@@ -465,17 +457,17 @@ static void import_hub(import *j, tree *hub)
 
     make_line(j, hub);
     if (name)
-        import_set_text(j, IMPORT_HEAD, line_of(hub, "name"), "device", name);
+        import_set_text(j, IMPORT_HEAD, tree_line(hub, "name"), "device", name);
     import_set(j, IMPORT_HEAD, hub->line, "unit", "%u", j->has_unit ? j->unit : 1);
     /* What Home Assistant does without scan_interval. */
     import_set(j, IMPORT_HEAD, hub->line, "interval", "15s");
     if (strcmp(delay, "0") != 0)
-        import_set(j, IMPORT_HEAD, line_of(hub, "delay"), "delay", "%ss", delay);
+        import_set(j, IMPORT_HEAD, tree_line(hub, "delay"), "delay", "%ss", delay);
     if (strcmp(pause, "0") != 0)
-        import_set(j, IMPORT_HEAD, line_of(hub, "message_wait_milliseconds"), "message_wait",
+        import_set(j, IMPORT_HEAD, tree_line(hub, "message_wait_milliseconds"), "message_wait",
                    "%sms", pause);
     if (is_true(tree_text(hub, "close_comm_on_error", NULL)))
-        import_set(j, IMPORT_HEAD, line_of(hub, "close_comm_on_error"), "close", "error");
+        import_set(j, IMPORT_HEAD, tree_line(hub, "close_comm_on_error"), "close", "error");
     import_timeout(j, hub);
     import_each(j, hub, "sensors", import_sensor);
     import_each(j, hub, "binary_sensors", import_binary_sensor);

@@ -4,13 +4,14 @@
 #include "import.h"
 
 #include "numbers.h"
+#include "reach.h"
 #include "report.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A type of theirs; the registers of a value, 0 for a text or for as many as there are addresses.
+/* A type of telegraf; the registers of a value, 0 for a text or for as many as there are addresses.
  */
 typedef struct type_of_theirs {
     const char *theirs, *ours;
@@ -280,13 +281,13 @@ static void make_line(import *j, tree *plugin)
         import_lose(j, plugin->line, "controller", "%s has no counterpart", controller);
 }
 
-/* Moves a time or a number to the head, if it is not 0. */
-static void set_time(import *j, tree *from, const char *theirs, const char *ours)
+/* Copies a time or a number to the head, unless it is 0. */
+static void copy_to_head(import *j, tree *from, const char *theirs, const char *ours)
 {
     const char *text = tree_text(from, theirs, NULL);
 
     if (text && strtod(text, NULL) != 0)
-        import_set(j, IMPORT_HEAD, tree_peek(from, theirs)->line, ours, "%s", text);
+        import_set(j, IMPORT_HEAD, tree_line(from, theirs), ours, "%s", text);
 }
 
 static void import_workarounds(import *j, tree *plugin)
@@ -295,26 +296,26 @@ static void import_workarounds(import *j, tree *plugin)
 
     if (!of || of->kind != TREE_MAP)
         return;
-    set_time(j, of, "pause_after_connect", "delay");
-    set_time(j, of, "pause_between_requests", "message_wait");
-    set_time(j, of, "max_word_registers_per_request", "max_read_registers");
-    set_time(j, of, "max_bit_registers_per_request", "max_read_bits");
+    copy_to_head(j, of, "pause_after_connect", "delay");
+    copy_to_head(j, of, "pause_between_requests", "message_wait");
+    copy_to_head(j, of, "max_word_registers_per_request", "max_read_registers");
+    copy_to_head(j, of, "max_bit_registers_per_request", "max_read_bits");
     if (strcmp(tree_text(of, "close_connection_after_gather", "false"), "true") == 0)
         import_set(j, IMPORT_HEAD, of->line, "close", "round");
     import_lose_rest(j, of, "workarounds");
 }
 
-/* Reads timeout, which Go may write as a device file does not: 1m30s. */
+/* Takes timeout over, unless a device file cannot have it: Go may write 1m30s. */
 static void import_timeout(import *j, tree *plugin)
 {
     const char *text = tree_text(plugin, "timeout", NULL);
-    uint32_t milliseconds;
-    const char *wrong = text ? number_time(text, 1, 1000000, &milliseconds) : NULL;
+    reach read = {0};
+    const char *wrong = text ? reach_read(&read, REACH_TIMEOUT, text) : NULL;
 
     if (wrong)
-        import_lose(j, tree_peek(plugin, "timeout")->line, "timeout", "%s", wrong);
+        import_lose(j, tree_line(plugin, "timeout"), "timeout", "%s", wrong);
     else if (text)
-        import_set(j, IMPORT_HEAD, tree_peek(plugin, "timeout")->line, "timeout", "%s", text);
+        import_set(j, IMPORT_HEAD, tree_line(plugin, "timeout"), "timeout", "%s", text);
 }
 
 static void import_plugin(import *j, tree *plugin, tree *agent)
@@ -330,13 +331,14 @@ static void import_plugin(import *j, tree *plugin, tree *agent)
     import_set(j, IMPORT_HEAD, plugin->line, "unit", "%s",
                j->has_unit ? say("%u", j->unit) : tree_text(plugin, "slave_id", "1"));
     (void)tree_find(plugin, "slave_id");
-    set_time(j, tree_peek(plugin, "interval") || !agent ? plugin : agent, "interval", "interval");
+    copy_to_head(j, tree_peek(plugin, "interval") || !agent ? plugin : agent, "interval",
+                 "interval");
     (void)tree_find(plugin, "configuration_type");
     (void)tree_find(plugin, "debug_connection");
     (void)tree_find(plugin, "exclude_register_type_tag");
     import_timeout(j, plugin);
-    set_time(j, plugin, "busy_retries", "busy_retries");
-    set_time(j, plugin, "busy_retries_wait", "busy_wait");
+    copy_to_head(j, plugin, "busy_retries", "busy_retries");
+    copy_to_head(j, plugin, "busy_retries_wait", "busy_wait");
     import_workarounds(j, plugin);
     import_registers(j, plugin, "discrete_inputs", "discrete", location);
     import_registers(j, plugin, "coils", "coils", location);

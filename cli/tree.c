@@ -78,6 +78,13 @@ int tree_has(const tree *map, const char *key, const char *word)
     return found && found->kind == TREE_WORD && strcmp(found->text, word) == 0;
 }
 
+int tree_line(const tree *map, const char *key)
+{
+    const tree *found = tree_peek(map, key);
+
+    return found ? found->line : map->line;
+}
+
 const char *tree_text(tree *map, const char *key, const char *otherwise)
 {
     const tree *found = tree_find(map, key);

@@ -41,6 +41,9 @@ int tree_has(const tree *map, const char *key, const char *word);
 /* The text of a key that is a word, or `otherwise`. */
 const char *tree_text(tree *map, const char *key, const char *otherwise);
 
+/* The line of a key, or that of its map. */
+int tree_line(const tree *map, const char *key);
+
 /* Marks a node and all below it as used. */
 void tree_use(tree *of);
 
