@@ -526,7 +526,7 @@ static int begin(bridge *b)
         return report(CODE_SYSTEM, REPORT_NO_MEMORY);
     b->settings.is_plain = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_PLAIN);
     b->settings.is_every = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_ALL);
-    b->settings.has_discovery = (uint8_t)bridge_setup_is(&b->setup, BRIDGE_DISCOVERY);
+    b->settings.has_discovery = b->setup.values[BRIDGE_DISCOVERY] != NULL;
     if (b->setup.values[BRIDGE_DISCOVERY_PREFIX])
         b->settings.discovery_prefix = strdup(b->setup.values[BRIDGE_DISCOVERY_PREFIX]);
     code = begin_lines(b);

@@ -21,7 +21,6 @@ const char *const bridge_names[] = {
 
 enum { LINE, THE_FILE, LINE_TOPIC, LINE_REACH, LINE_KEYS = LINE_REACH + REACH_FILE_KEYS };
 static const char *const LINE_NAMES[] = {"line", "file", "topic", REACH_FILE_NAMES, NULL};
-static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 static const char *const DISCOVERIES[] = {"homeassistant", NULL};
 
 /* --- settings --- */
@@ -62,6 +61,7 @@ static const char *check_value(int setting, const char *text)
 {
     uint32_t milliseconds;
     int64_t number;
+    uint8_t is_yes;
     int index;
 
     switch (setting) {
@@ -74,7 +74,7 @@ static const char *check_value(int setting, const char *text)
             return say("\"%s\" is not 1 to %d bytes without +, # and space", text, LONGEST_PREFIX);
         return NULL;
     case BRIDGE_PLAIN:
-    case BRIDGE_ALL: return number_word(text, ANSWERS, &index);
+    case BRIDGE_ALL: return number_answer(text, &is_yes);
     case BRIDGE_GAP: return number_read(text, 0, 123, &number);
     case BRIDGE_WRITE_FUNCTION: return number_word(text, device_functions, &index);
     default: return NULL;
@@ -157,8 +157,11 @@ uint8_t bridge_setup_function(const bridge_setup *of)
 int bridge_setup_is(const bridge_setup *of, int setting)
 {
     const char *value = of->values[setting];
+    uint8_t is_yes = 0;
 
-    return value && strcmp(value, "no") != 0 && strcmp(value, "false") != 0;
+    if (value)
+        (void)number_answer(value, &is_yes);
+    return is_yes;
 }
 
 /* --- lines --- */

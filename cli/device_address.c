@@ -20,17 +20,17 @@ int device_address_read_notation(yaml_file *file, const yaml_node_t *notation,
                                  const yaml_node_t *one_based, device *into)
 {
     static const char *const NOTATIONS[] = {"wire", "modicon", NULL};
-    static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
-    int is_modicon = 0, answer = 0;
+    uint8_t is_one_based = 0;
+    int is_modicon = 0;
 
     if (!yaml_file_word(file, "notation", notation, NOTATIONS, &is_modicon) ||
-        !yaml_file_word(file, "one_based", one_based, ANSWERS, &answer))
+        !yaml_file_answer(file, "one_based", one_based, &is_one_based))
         return 0;
     if (is_modicon && one_based)
         return yaml_file_refuse(file, one_based,
                                 "one_based and \"notation: modicon\" exclude each other: 40001 "
                                 "counts from 1 already");
-    into->notation = is_modicon ? DEVICE_MODICON : answer & 1 ? DEVICE_ONE_BASED : DEVICE_ON_WIRE;
+    into->notation = is_modicon ? DEVICE_MODICON : is_one_based ? DEVICE_ONE_BASED : DEVICE_ON_WIRE;
     return 1;
 }
 

@@ -93,10 +93,8 @@ static const char *const FIELD_NAMES[] = {"name",          "table",
 
 #define NEEDED_OF_FIELD (1u << NAME | 1u << ADDRESS)
 
-/* Words whose numbers are their places; those of access count from 1, like the words of value.h.
- * The lowest bit of an answer says whether it is yes. */
+/* Words whose numbers are their places, from 1 on, like the words of value.h. */
 static const char *const ACCESS_NAMES[] = {"", "read", "write", "read-write", NULL};
-static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 
 /* --- a field --- */
 
@@ -496,21 +494,19 @@ static int read_root(yaml_file *file, const yaml_node_t *root, void *from)
     device *into = (device *)from;
     head shared = {.planned = {.unit = 1, .intervalMs = 1000, .order = MBM_ORDER_ABCD}};
     const yaml_node_t *values[DEVICE_KEYS] = {NULL};
-    int writes_masks = 0;
 
     if (!yaml_file_keys(file, "the file", root, DEVICE_NAMES, 1u << FIELDS, values) ||
         !yaml_file_copy(file, "device", values[DEVICE], DEVICE_NAME_BYTES, &into->name) ||
         !read_shared(file, values[DEVICE_UNIT], values[DEVICE_INTERVAL], values[DEVICE_ORDER],
                      &shared.planned) ||
         !device_values_check_shared(file, values[DEVICE_NOT_AVAILABLE]) ||
-        !yaml_file_word(file, "mask_write", values[MASK_WRITE], ANSWERS, &writes_masks) ||
+        !yaml_file_answer(file, "mask_write", values[MASK_WRITE], &into->writes_masks) ||
         !device_address_read_notation(file, values[NOTATION], values[ONE_BASED], into) ||
         !device_limits_read_function(file, values[DEVICE_WRITE_FUNCTION], &shared.write_function) ||
         !device_types_read_zone(file, values[DEVICE_TIME_ZONE], &shared.zone) ||
         !device_limits_read(file, values + LIMITS, into) ||
         !reach_read_nodes(file, values + REACH, &into->reach))
         return 0;
-    into->writes_masks = writes_masks & 1;
     shared.not_available = values[DEVICE_NOT_AVAILABLE];
     return read_fields(file, values[FIELDS], &shared, into) && device_names_make(file, into) &&
            sort_fields(file, into) && read_late(file, into);

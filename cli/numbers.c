@@ -206,6 +206,17 @@ const char *number_word(const char *text, const char *const *words, int *index)
                list);
 }
 
+const char *number_answer(const char *text, uint8_t *is_yes)
+{
+    static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
+    int index;
+    const char *wrong = number_word(text, ANSWERS, &index);
+
+    if (!wrong)
+        *is_yes = index & 1;
+    return wrong;
+}
+
 /* --- bytes --- */
 
 const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t *count)

@@ -22,6 +22,9 @@ const char *number_time(const char *text, uint32_t least, uint32_t most, uint32_
 /* One of several words, whose list ends with NULL. `index` receives its place in the list. */
 const char *number_word(const char *text, const char *const *words, int *index);
 
+/* One of the words no, yes, false and true. */
+const char *number_answer(const char *text, uint8_t *is_yes);
+
 /* Hexadecimal bytes: pairs of digits, without or with spaces between them. Appends them to `bytes`,
  * which has `*count` of `capacity`. */
 const char *number_hex(const char *text, uint8_t *bytes, size_t capacity, size_t *count);

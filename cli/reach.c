@@ -15,7 +15,6 @@ const char *const reach_names[] = {REACH_NAMES, NULL};
 /* Words of a list: each has the number that its place says. */
 static const char *const ACCEPTS[] = {"unit", "transaction", NULL};
 static const char *const CLOSES[] = {"never", "round", "error", NULL};
-static const char *const ANSWERS[] = {"no", "yes", "false", "true", NULL};
 
 /* --- values --- */
 
@@ -69,20 +68,11 @@ static const char *read_count(const char *text, uint8_t *count)
     return wrong;
 }
 
-static const char *read_answer(const char *text, uint8_t *answer)
-{
-    int index = 0;
-    const char *wrong = number_word(text, ANSWERS, &index);
-
-    *answer = index & 1;
-    return wrong;
-}
-
 static const char *read_value(reach *into, int key, const char *text)
 {
     switch (key) {
     case REACH_ACCEPT: return read_accept(into, text);
-    case REACH_LENIENT: return read_answer(text, &into->is_lenient);
+    case REACH_LENIENT: return number_answer(text, &into->is_lenient);
     case REACH_DELAY: return number_time(text, 0, LONGEST_TIME, &into->delayMs);
     case REACH_MESSAGE_WAIT: return number_time(text, 0, LONGEST_TIME, &into->message_waitMs);
     case REACH_CLOSE: return read_close(into, text);

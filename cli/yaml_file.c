@@ -245,6 +245,16 @@ int yaml_file_kind(yaml_file *file, const char *key, const yaml_node_t *node,
     return 1;
 }
 
+int yaml_file_answer(yaml_file *file, const char *key, const yaml_node_t *node, uint8_t *is_yes)
+{
+    const char *text;
+
+    if (!node)
+        return 1;
+    text = yaml_file_text(file, key, node, MOST_WORD);
+    return text && check_value(file, key, node, number_answer(text, is_yes));
+}
+
 const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node)
 {
     const char *text = yaml_file_text(file, key, node, MOST_WORD);

@@ -60,14 +60,15 @@ const char *yaml_file_text(yaml_file *file, const char *key, const yaml_node_t *
 const char *yaml_file_decimal(yaml_file *file, const char *key, const yaml_node_t *node);
 
 /* Read a copy of the text, for free(); the place of the word in a list that NULL ends, from 0 on;
- * the same from 1 on; the number; the time in milliseconds. If the node is NULL, the value stays.
- * They return 0 after a refusal. */
+ * the same from 1 on; yes or no; the number; the time in milliseconds. If the node is NULL, the
+ * value stays. They return 0 after a refusal. */
 int yaml_file_copy(yaml_file *file, const char *key, const yaml_node_t *node, size_t most,
                    char **copy);
 int yaml_file_word(yaml_file *file, const char *key, const yaml_node_t *node,
                    const char *const *words, int *index);
 int yaml_file_kind(yaml_file *file, const char *key, const yaml_node_t *node,
                    const char *const *words, uint8_t *kind);
+int yaml_file_answer(yaml_file *file, const char *key, const yaml_node_t *node, uint8_t *is_yes);
 int yaml_file_number(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
                      uint32_t most, uint32_t *value);
 int yaml_file_time(yaml_file *file, const char *key, const yaml_node_t *node, uint32_t least,
