@@ -1,7 +1,7 @@
 //! A client whose calls wait for their end.
 
 use super::call::{
-    quantity, take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords,
+    take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords,
     WriteRecords, CALL_BYTES,
 };
 use super::calls::calls;
@@ -15,7 +15,7 @@ use crate::pdu::custom::Rule;
 use crate::pdu::functions::{coil_value, FunctionSpec};
 use crate::pdu::identification::{DeviceIdCode, IdentificationReply};
 use crate::pdu::identification_stream::{Next, ObjectStream};
-use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
+use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
 
 /// A client whose calls wait for their end: each function of the standard, and functions of the

@@ -5,6 +5,7 @@ use super::request::{ClientRequest, RequestState};
 use crate::data::view::take_words;
 use crate::error::{Error, Status};
 use crate::pdu::files::{Reads, Writes, REFERENCE_TYPE};
+use crate::pdu::quantity;
 
 /// Bytes of data that any request sends, or any response has.
 pub const CALL_BYTES: usize = 252;
@@ -148,11 +149,6 @@ impl<const D: usize> ClientRequest for Call<D> {
             *last &= mask;
         }
     }
-}
-
-/// A number of items. No request has more than 65535, so these are refused too.
-pub(super) fn quantity(items: usize) -> u16 {
-    items.try_into().unwrap_or(u16::MAX)
 }
 
 /// Consecutive records of a file to read: see

@@ -1,10 +1,10 @@
 //! A master whose functions are futures, over the traits of embedded-io-async.
 
-use super::calls::{calls, quantity};
+use super::calls::calls;
 use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;
-use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
+use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
 use core::future::{poll_fn, ready, Future};
 use core::pin::pin;

@@ -191,8 +191,3 @@ macro_rules! calls {
 }
 
 pub(super) use calls;
-
-/// A number of items. More than 65535 are refused as 65535 are.
-pub(super) fn quantity(items: usize) -> u16 {
-    items.try_into().unwrap_or(u16::MAX)
-}

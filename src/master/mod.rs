@@ -20,9 +20,9 @@ pub use crate::engine::{
 };
 use crate::error::{Error, Status};
 use crate::pdu::functions::FunctionSpec;
-use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
+use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
-use calls::{calls, quantity};
+use calls::calls;
 use core::task::Poll;
 use node::Node;
 use request::Line;

@@ -54,6 +54,11 @@ pub const WRITE_FILE_BYTES: (usize, usize) = (0x09, 0xFB);
 /// (6.21).
 const MORE: u8 = 0xFF;
 
+/// A number of items. More than 65535 are refused as 65535 are.
+pub(crate) fn quantity(items: usize) -> u16 {
+    items.try_into().unwrap_or(u16::MAX)
+}
+
 /// Checks a range of addresses as every device would (application protocol,
 /// figures 11 and following: quantity first, then addresses).
 pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {

@@ -1,10 +1,11 @@
 //! The requests of the functions beside the ten that read and write the four tables.
 
-use super::{quantity, Request, Slice};
+use super::{Request, Slice};
 use crate::error::{Error, Status};
 use crate::pdu::custom::Rule;
 use crate::pdu::functions::FunctionSpec;
 use crate::pdu::identification::DeviceIdCode;
+use crate::pdu::quantity;
 
 impl<'a> Request<'a> {
     /// 07: reads the eight exception status outputs, the first in the lowest bit. See

@@ -2,11 +2,11 @@
 
 mod functions;
 
-use super::call::quantity;
 use super::request::{ClientRequest, RequestState};
 use crate::data::view::take_words;
 use crate::error::{Error, Status};
 use crate::pdu::functions::{coil_value, FunctionSpec};
+use crate::pdu::quantity;
 
 /// The data that a request sends, or the place for those that it receives.
 #[derive(Default, Debug)]
