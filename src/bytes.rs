@@ -18,6 +18,14 @@ pub(crate) fn move_items<T: Copy>(to: &[Cell<T>], from: &[Cell<T>]) {
     }
 }
 
+/// Copies items, as many as both slices have.
+#[inline(always)]
+pub(crate) fn copy<T: Copy>(to: &mut [T], from: &[T]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
+    }
+}
+
 /// Reads a byte slice from its front.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader<'a> {

@@ -1,8 +1,8 @@
 //! A client whose calls wait for their end.
 
 use super::call::{
-    take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords,
-    WriteRecords, CALL_BYTES,
+    take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
+    CALL_BYTES,
 };
 use super::calls::calls;
 use super::storage::TcpBuffers;

@@ -1,10 +1,13 @@
 //! A request that has its own place for data, so that a call can wait for it with slices of any
 //! lifetime.
 
-use super::request::{ClientRequest, RequestState};
-use crate::data::view::take_words;
+use super::request::{store_bytes, ClientRequest, RequestState};
+use crate::bytes::{copy, Writer};
+use crate::data::bits::{byte_of, take_coils};
+use crate::data::view::{send_words, take_words};
 use crate::error::{Error, Status};
 use crate::pdu::files::{Reads, Writes, REFERENCE_TYPE};
+use crate::pdu::functions::FunctionSpec;
 use crate::pdu::quantity;
 
 /// Bytes of data that any request sends, or any response has.
@@ -29,14 +32,8 @@ impl<const D: usize> Call<D> {
         takes: usize,
         build: impl FnOnce(&mut RequestState) -> Status,
     ) -> Result<Self, Error> {
-        let mut state = RequestState::NONE;
-        state.unit = unit.into();
-        state.capacity = takes.min(D).try_into().unwrap_or(u16::MAX);
-        match build(&mut state) {
-            Status::OK => {}
-            refused => return Err(Error::refused(refused)),
-        }
-        if usize::from(state.data_length()) > D || u16::from(state.known_data()) > state.capacity {
+        let state = RequestState::made(unit, quantity(takes.min(D)), build)?;
+        if usize::from(state.data_length()) > D {
             return Err(Error::BufferTooSmall);
         }
         Ok(Call {
@@ -45,28 +42,33 @@ impl<const D: usize> Call<D> {
         })
     }
 
+    /// A request with two words after the function code; a function with fewer ignores them.
+    pub(super) fn short(
+        unit: u8,
+        spec: FunctionSpec,
+        (first, second): (u16, u16),
+        takes: usize,
+    ) -> Result<Self, Error> {
+        Call::new(unit, takes, |state| state.set(spec, first, second))
+    }
+
     /// Sets the data to send: registers.
     pub(super) fn with_registers(mut self, registers: &[u16]) -> Self {
-        for (place, register) in self.data.as_chunks_mut().0.iter_mut().zip(registers) {
-            *place = register.to_be_bytes();
-        }
+        send_words(&mut self.data, registers);
         self
     }
 
     /// Sets the data to send: coils.
     pub(super) fn with_coils(mut self, coils: &[bool]) -> Self {
         for (place, coils) in self.data.iter_mut().zip(coils.chunks(8)) {
-            let coils = coils.iter().rev();
-            *place = coils.fold(0, |byte, on| byte << 1 | u8::from(*on));
+            *place = byte_of(coils);
         }
         self
     }
 
     /// Sets the data to send: bytes.
     pub(super) fn with_bytes(mut self, bytes: &[u8]) -> Self {
-        for (place, byte) in self.data.iter_mut().zip(bytes) {
-            *place = *byte;
-        }
+        copy(&mut self.data, bytes);
         self
     }
 
@@ -105,20 +107,14 @@ impl<const D: usize> Call<D> {
         if self.bytes().len() < coils.len().div_ceil(8) {
             return Err(Error::MalformedReply);
         }
-        for (coils, byte) in coils.chunks_mut(8).zip(self.bytes()) {
-            for (bit, coil) in coils.iter_mut().enumerate() {
-                *coil = byte >> bit & 1 != 0;
-            }
-        }
+        take_coils(coils, self.bytes());
         Ok(())
     }
 
     /// Takes bytes from the response, which has no more than the caller takes.
     pub(super) fn take_bytes<'b>(&self, bytes: &'b mut [u8]) -> &'b [u8] {
         let data = self.bytes();
-        for (place, byte) in bytes.iter_mut().zip(data) {
-            *place = *byte;
-        }
+        copy(bytes, data);
         bytes.get(..data.len()).unwrap_or_default()
     }
 
@@ -142,12 +138,7 @@ impl<const D: usize> ClientRequest for Call<D> {
     }
 
     fn store(&mut self, data: &[u8], mask: u8) {
-        for (place, byte) in self.data.iter_mut().zip(data) {
-            *place = *byte;
-        }
-        if let Some(last) = self.data.get_mut(data.len().wrapping_sub(1)) {
-            *last &= mask;
-        }
+        store_bytes(&mut self.data, data, mask);
     }
 }
 
@@ -183,54 +174,40 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    const NONE: Groups = Groups {
-        bytes: [0; CALL_BYTES],
-        length: 0,
-    };
-
-    /// Adds bytes. Those that no request can have are only counted.
-    fn add(&mut self, bytes: &[u8]) {
-        let places = self.bytes.get_mut(self.length..).unwrap_or_default();
-        for (place, byte) in places.iter_mut().zip(bytes) {
-            *place = *byte;
-        }
-        self.length += bytes.len();
-    }
-
-    fn add_range(&mut self, file: u16, record: u16, records: usize) {
-        self.add(&[REFERENCE_TYPE]);
-        for word in [file, record, quantity(records)] {
-            self.add(&word.to_be_bytes());
+    /// The groups that `put` writes, if a request can have as many.
+    fn of(put: impl FnOnce(&mut Writer)) -> Result<Groups, Error> {
+        let mut bytes = [0; CALL_BYTES];
+        let mut writer = Writer::new(&mut bytes);
+        put(&mut writer);
+        match writer.finish() {
+            Ok(length) => Ok(Groups { bytes, length }),
+            Err(_) => Err(Error::InvalidQuantity),
         }
     }
 
     /// The groups that read these records, if the standard allows them.
     pub(super) fn read(groups: &[ReadRecords]) -> Result<Groups, Error> {
-        let mut all = Groups::NONE;
-        for group in groups {
-            all.add_range(group.file, group.record, group.records.len());
-        }
-        let checked = all.bytes().and_then(Reads::new);
-        checked.map_err(|error| Error::refused(error.status()))?;
+        let all = Groups::of(|writer| {
+            for group in groups {
+                put_range(writer, group.file, group.record, group.records.len());
+            }
+        })?;
+        Reads::new(all.as_bytes()).map_err(|error| Error::refused(error.status()))?;
         Ok(all)
     }
 
     /// The groups that write these records, if the standard allows them.
     pub(super) fn write(groups: &[WriteRecords]) -> Result<Groups, Error> {
-        let mut all = Groups::NONE;
-        for group in groups {
-            all.add_range(group.file, group.record, group.records.len());
-            for record in group.records {
-                all.add(&record.to_be_bytes());
+        let all = Groups::of(|writer| {
+            for group in groups {
+                put_range(writer, group.file, group.record, group.records.len());
+                for record in group.records {
+                    writer.u16(*record);
+                }
             }
-        }
-        let checked = all.bytes().and_then(Writes::new);
-        checked.map_err(|error| Error::refused(error.status()))?;
+        })?;
+        Writes::new(all.as_bytes()).map_err(|error| Error::refused(error.status()))?;
         Ok(all)
-    }
-
-    fn bytes(&self) -> Result<&[u8], Error> {
-        self.bytes.get(..self.length).ok_or(Error::InvalidQuantity)
     }
 
     /// How many bytes the groups have.
@@ -240,7 +217,15 @@ impl Groups {
 
     /// The bytes of the groups.
     pub(super) fn as_bytes(&self) -> &[u8] {
-        self.bytes().unwrap_or_default()
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+}
+
+/// Writes the beginning of a group, which says which records it is about.
+fn put_range(writer: &mut Writer, file: u16, record: u16, records: usize) {
+    writer.u8(REFERENCE_TYPE);
+    for word in [file, record, quantity(records)] {
+        writer.u16(word);
     }
 }
 

@@ -21,9 +21,8 @@ macro_rules! calls {
             coils: &mut [bool],
         ) -> Result<(), Error> {
             let count = quantity(coils.len());
-            let call = Call::new(unit, coils.len().div_ceil(8), |request| {
-                request.set(FunctionSpec::READ_COILS, address, count)
-            })?;
+            let spec = FunctionSpec::READ_COILS;
+            let call = Call::short(unit, spec, (address, count), coils.len().div_ceil(8))?;
             self.call(call)$($wait)*?.fill_coils(coils)
         }
 
@@ -38,9 +37,8 @@ macro_rules! calls {
             inputs: &mut [bool],
         ) -> Result<(), Error> {
             let count = quantity(inputs.len());
-            let call = Call::new(unit, inputs.len().div_ceil(8), |request| {
-                request.set(FunctionSpec::READ_DISCRETE_INPUTS, address, count)
-            })?;
+            let spec = FunctionSpec::READ_DISCRETE_INPUTS;
+            let call = Call::short(unit, spec, (address, count), inputs.len().div_ceil(8))?;
             self.call(call)$($wait)*?.fill_coils(inputs)
         }
 
@@ -55,9 +53,8 @@ macro_rules! calls {
             registers: &mut [u16],
         ) -> Result<(), Error> {
             let count = quantity(registers.len());
-            let call = Call::new(unit, 2 * usize::from(count), |request| {
-                request.set(FunctionSpec::READ_HOLDING_REGISTERS, address, count)
-            })?;
+            let spec = FunctionSpec::READ_HOLDING_REGISTERS;
+            let call = Call::short(unit, spec, (address, count), 2 * usize::from(count))?;
             self.call(call)$($wait)*?.fill_registers(registers)
         }
 
@@ -72,9 +69,8 @@ macro_rules! calls {
             registers: &mut [u16],
         ) -> Result<(), Error> {
             let count = quantity(registers.len());
-            let call = Call::new(unit, 2 * usize::from(count), |request| {
-                request.set(FunctionSpec::READ_INPUT_REGISTERS, address, count)
-            })?;
+            let spec = FunctionSpec::READ_INPUT_REGISTERS;
+            let call = Call::short(unit, spec, (address, count), 2 * usize::from(count))?;
             self.call(call)$($wait)*?.fill_registers(registers)
         }
 
@@ -151,9 +147,8 @@ macro_rules! calls {
             address: u16,
             on: bool,
         ) -> Result<(), Error> {
-            let call = Call::new(unit, 0, |request| {
-                request.set(FunctionSpec::WRITE_SINGLE_COIL, address, coil_value(on))
-            })?;
+            let spec = FunctionSpec::WRITE_SINGLE_COIL;
+            let call = Call::short(unit, spec, (address, coil_value(on)), 0)?;
             self.call(call)$($wait)*?;
             Ok(())
         }
@@ -168,9 +163,7 @@ macro_rules! calls {
             address: u16,
             value: u16,
         ) -> Result<(), Error> {
-            let call = Call::new(unit, 0, |request| {
-                request.set(FunctionSpec::WRITE_SINGLE_REGISTER, address, value)
-            })?;
+            let call = Call::short(unit, FunctionSpec::WRITE_SINGLE_REGISTER, (address, value), 0)?;
             self.call(call)$($wait)*?;
             Ok(())
         }
@@ -186,9 +179,7 @@ macro_rules! calls {
             coils: &[bool],
         ) -> Result<(), Error> {
             let count = quantity(coils.len());
-            let call = Call::new(unit, 0, |request| {
-                request.set(FunctionSpec::WRITE_MULTIPLE_COILS, address, count)
-            })?;
+            let call = Call::short(unit, FunctionSpec::WRITE_MULTIPLE_COILS, (address, count), 0)?;
             self.call(call.with_coils(coils))$($wait)*?;
             Ok(())
         }
@@ -204,9 +195,8 @@ macro_rules! calls {
             registers: &[u16],
         ) -> Result<(), Error> {
             let count = quantity(registers.len());
-            let call = Call::new(unit, 0, |request| {
-                request.set(FunctionSpec::WRITE_MULTIPLE_REGISTERS, address, count)
-            })?;
+            let spec = FunctionSpec::WRITE_MULTIPLE_REGISTERS;
+            let call = Call::short(unit, spec, (address, count), 0)?;
             self.call(call.with_registers(registers))$($wait)*?;
             Ok(())
         }
@@ -251,9 +241,7 @@ macro_rules! calls {
         /// # Errors
         /// As [`Self::read_coils`].
         pub $($async)? fn read_exception_status(&mut self, unit: u8) -> Result<u8, Error> {
-            let call = Call::new(unit, 1, |request| {
-                request.set(FunctionSpec::READ_EXCEPTION_STATUS, 0, 0)
-            })?;
+            let call = Call::short(unit, FunctionSpec::READ_EXCEPTION_STATUS, (0, 0), 1)?;
             let call = self.call(call)$($wait)*?;
             Ok(call.bytes().first().copied().unwrap_or(0))
         }
@@ -286,9 +274,7 @@ macro_rules! calls {
             &mut self,
             unit: u8,
         ) -> Result<CommEventCounter, Error> {
-            let call = Call::new(unit, 4, |request| {
-                request.set(FunctionSpec::GET_COMM_EVENT_COUNTER, 0, 0)
-            })?;
+            let call = Call::short(unit, FunctionSpec::GET_COMM_EVENT_COUNTER, (0, 0), 4)?;
             let mut words = [0; 2];
             self.call(call)$($wait)*?.fill_registers(&mut words)?;
             let [status, events] = words;
@@ -305,9 +291,7 @@ macro_rules! calls {
             unit: u8,
             place: &'b mut [u8],
         ) -> Result<CommEventLog<'b>, Error> {
-            let call = Call::new(unit, place.len(), |request| {
-                request.set(FunctionSpec::GET_COMM_EVENT_LOG, 0, 0)
-            })?;
+            let call = Call::short(unit, FunctionSpec::GET_COMM_EVENT_LOG, (0, 0), place.len())?;
             CommEventLog::parse(self.call(call)$($wait)*?.take_bytes(place))
         }
 
@@ -321,9 +305,7 @@ macro_rules! calls {
             unit: u8,
             place: &'b mut [u8],
         ) -> Result<&'b [u8], Error> {
-            let call = Call::new(unit, place.len(), |request| {
-                request.set(FunctionSpec::REPORT_SERVER_ID, 0, 0)
-            })?;
+            let call = Call::short(unit, FunctionSpec::REPORT_SERVER_ID, (0, 0), place.len())?;
             Ok(self.call(call)$($wait)*?.take_bytes(place))
         }
 
@@ -410,9 +392,8 @@ macro_rules! calls {
             address: u16,
             place: &'b mut [u16],
         ) -> Result<&'b [u16], Error> {
-            let call = Call::new(unit, place.len().saturating_mul(2), |request| {
-                request.set(FunctionSpec::READ_FIFO_QUEUE, address, 0)
-            })?;
+            let spec = FunctionSpec::READ_FIFO_QUEUE;
+            let call = Call::short(unit, spec, (address, 0), place.len().saturating_mul(2))?;
             Ok(self.call(call)$($wait)*?.take_registers(place))
         }
 

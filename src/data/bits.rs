@@ -28,6 +28,21 @@ pub fn take(words: &mut [u16], bytes: &[u8], quantity: u8) {
     }
 }
 
+/// The data byte of up to eight coils.
+pub(crate) fn byte_of(coils: &[bool]) -> u8 {
+    let coils = coils.iter().rev();
+    coils.fold(0, |byte, on| byte << 1 | u8::from(*on))
+}
+
+/// Fills `coils` from data bytes. Coils beyond the last byte do not change.
+pub(crate) fn take_coils(coils: &mut [bool], bytes: &[u8]) {
+    for (coils, byte) in coils.chunks_mut(8).zip(bytes) {
+        for (bit, coil) in coils.iter_mut().enumerate() {
+            *coil = byte.bit(bit);
+        }
+    }
+}
+
 /// A mask of the `used` lowest bits, for the last byte or word; all bits if `used` is 0.
 const fn mask(used: u8) -> u16 {
     match used {

@@ -230,20 +230,17 @@ impl<'a> Request<'a> {
         body: &'a mut [u8],
         takes: &'a mut [u8],
     ) -> Result<Self, Error> {
-        let mut state = crate::client::RequestState::NONE;
-        // A longer body is refused by its length, which must not wrap.
-        let status = match u8::try_from(body.len()) {
-            Ok(_) => state.forward(function, body),
-            Err(_) => Status::ILLEGAL_DATA_VALUE,
-        };
-        let head = body.len().saturating_sub(state.data_length().into());
-        let data = body.get_mut(head..).unwrap_or_default();
-        let (data, takes) = (Slice::Bytes(data), Slice::Bytes(takes));
-        Request::build(unit, data, takes, |made| {
-            let (unit, capacity) = (made.unit, made.capacity);
-            *made = state;
-            (made.unit, made.capacity) = (unit, capacity);
-            status
-        })
+        let mut request = Request::build(unit, Slice::None, Slice::Bytes(takes), |state| {
+            match u8::try_from(body.len()) {
+                Ok(_) => state.forward(function, body),
+                // A longer body is refused by its length, which must not wrap.
+                Err(_) => Status::ILLEGAL_DATA_VALUE,
+            }
+        })?;
+        let head = body
+            .len()
+            .saturating_sub(request.state.data_length().into());
+        request.sends = Slice::Bytes(body.get_mut(head..).unwrap_or_default());
+        Ok(request)
     }
 }

@@ -2,7 +2,8 @@
 
 mod functions;
 
-use super::request::{ClientRequest, RequestState};
+use super::request::{store_bytes, ClientRequest, RequestState};
+use crate::data::bits::{byte_of, take_coils};
 use crate::data::view::take_words;
 use crate::error::{Error, Status};
 use crate::pdu::functions::{coil_value, FunctionSpec};
@@ -40,13 +41,7 @@ impl Slice<'_> {
                     false => low,
                 }
             }
-            Slice::Coils(coils) => {
-                let coils = coils.chunks(8).nth(index).unwrap_or_default();
-                coils
-                    .iter()
-                    .rev()
-                    .fold(0, |byte, on| byte << 1 | u8::from(*on))
-            }
+            Slice::Coils(coils) => byte_of(coils.chunks(8).nth(index).unwrap_or_default()),
             Slice::Bytes(bytes) => bytes.get(index).copied().unwrap_or(0),
         }
     }
@@ -55,22 +50,8 @@ impl Slice<'_> {
         match self {
             Slice::None => {}
             Slice::Registers(words) => take_words(words, data),
-            Slice::Coils(coils) => {
-                for (coils, byte) in coils.chunks_mut(8).zip(data) {
-                    for (bit, coil) in coils.iter_mut().enumerate() {
-                        *coil = byte >> bit & 1 != 0;
-                    }
-                }
-            }
-            Slice::Bytes(bytes) => {
-                for (place, byte) in bytes.iter_mut().zip(data) {
-                    *place = *byte;
-                }
-                let last = data.len().wrapping_sub(1);
-                if let Some(last) = bytes.get_mut(last) {
-                    *last &= mask;
-                }
-            }
+            Slice::Coils(coils) => take_coils(coils, data),
+            Slice::Bytes(bytes) => store_bytes(bytes, data, mask),
         }
     }
 }
@@ -95,18 +76,8 @@ impl<'a> Request<'a> {
         takes: Slice<'a>,
         build: impl FnOnce(&mut RequestState) -> Status,
     ) -> Result<Self, Error> {
-        let mut state = RequestState::NONE;
-        state.unit = unit.into();
-        state.capacity = takes.capacity();
-        match build(&mut state) {
-            Status::OK => {}
-            refused => return Err(Error::refused(refused)),
-        }
-        if u16::from(state.known_data()) > state.capacity {
-            return Err(Error::BufferTooSmall);
-        }
         Ok(Request {
-            state,
+            state: RequestState::made(unit, takes.capacity(), build)?,
             sends,
             takes,
         })

@@ -10,6 +10,7 @@ mod forward;
 mod pdu;
 mod restore;
 
+use crate::bytes::copy;
 use crate::engine::BROADCAST;
 use crate::error::{Error, Status};
 use crate::pdu::functions::FunctionSpec;
@@ -157,6 +158,24 @@ impl RequestState {
         self.stage = Stage::OtherUnit;
     }
 
+    /// The request that `build` makes. `capacity` is as [`RequestState::capacity`].
+    // In line, a plan takes 4 bytes less on a Cortex-M0+.
+    #[inline(always)]
+    pub(super) fn made(
+        unit: u8,
+        capacity: u16,
+        build: impl FnOnce(&mut RequestState) -> Status,
+    ) -> Result<Self, Error> {
+        let mut state = RequestState::NONE;
+        state.unit = unit.into();
+        state.capacity = capacity;
+        match build(&mut state) {
+            Status::OK if u16::from(state.known_data()) > capacity => Err(Error::BufferTooSmall),
+            Status::OK => Ok(state),
+            refused => Err(Error::refused(refused)),
+        }
+    }
+
     /// Enters a stage at the time `now`. The request is due again `wait` microseconds later.
     pub(super) fn enter(&mut self, stage: Stage, now: u32, wait: u32) {
         self.stage = stage;
@@ -206,6 +225,14 @@ pub(super) fn store_response<J: ClientRequest>(request: &mut J, pdu: &[u8]) -> S
     let mask = state.mask();
     request.store(data, mask);
     Status::OK
+}
+
+/// As [`ClientRequest::store`], in a place for bytes.
+pub(super) fn store_bytes(place: &mut [u8], data: &[u8], mask: u8) {
+    copy(place, data);
+    if let Some(last) = place.get_mut(data.len().wrapping_sub(1)) {
+        *last &= mask;
+    }
 }
 
 /// Returns a function that reads the data of a request. (All callers share one closure
