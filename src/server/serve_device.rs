@@ -4,7 +4,7 @@ use super::custom::{self, HandlerResult};
 use super::device::{Bits, BitsMut, Device};
 use super::files::{self, Fifos, Files};
 use super::identity::{serve_exception_status, serve_identification, Objects};
-use super::table::{self, TableAccess, TableKind, TableOperation, WRITTEN};
+use super::table::{self, counted, TableAccess, TableKind, TableOperation, WRITTEN};
 use super::Reply;
 use crate::data::view::{send_words, take_words};
 use crate::error::Exception;
@@ -131,9 +131,10 @@ impl<D: Device> TableAccess for Cells<'_, D> {
                 Err(exception) => refused(exception),
             };
         }
-        let (at, reads) = match operation.reads() {
-            true => (TableOperation::READ.data(), true),
-            false => (operation.data(), false),
+        let reads = operation.reads();
+        let at = match reads {
+            true => TableOperation::READ.data(),
+            false => operation.data(),
         };
         let Some(data) = pdu.get_mut(at..at + bytes) else {
             return Reply::SERVER_DEVICE_FAILURE;
@@ -151,10 +152,7 @@ impl<D: Device> TableAccess for Cells<'_, D> {
         if let Err(exception) = self.read(address, quantity, data) {
             return refused(exception);
         }
-        if let Some(count) = pdu.get_mut(1) {
-            *count = bytes as u8;
-        }
-        Reply::length(2 + bytes)
+        counted(pdu, bytes)
     }
 }
 
@@ -163,14 +161,11 @@ fn server_id(device: &mut impl Device, pdu: &mut [u8], length: usize) -> Reply {
         return Reply::ILLEGAL_DATA_VALUE;
     }
     let most = pdu.len().min(MAX_PDU);
-    let Some([_, count, data @ ..]) = pdu.get_mut(..most) else {
+    let Some([_, _, data @ ..]) = pdu.get_mut(..most) else {
         return Reply::SERVER_DEVICE_FAILURE;
     };
     match device.report_server_id(data) {
-        Ok(bytes) if bytes <= data.len() => {
-            *count = bytes as u8;
-            Reply::length(2 + bytes)
-        }
+        Ok(bytes) if bytes <= data.len() => counted(pdu, bytes),
         Ok(_) => Reply::SERVER_DEVICE_FAILURE,
         Err(exception) => refused(exception),
     }

@@ -284,7 +284,7 @@ const fn word(high: u8, low: u8) -> usize {
 
 /// Completes the response of a read whose data have been copied.
 #[inline(always)]
-fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
+pub(super) fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
     if let Some(count) = pdu.get_mut(1) {
         *count = bytes as u8;
     }

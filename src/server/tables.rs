@@ -1,6 +1,7 @@
 //! A device of arrays or slices.
 
 use super::device::{Bits, BitsMut, Device};
+use crate::bytes::copy;
 use crate::error::Exception;
 
 /// Values at consecutive addresses: an array, a slice or another container of them.
@@ -16,12 +17,6 @@ impl<C> Table<C> {
     /// Values from address `base` on.
     pub const fn new(base: u16, cells: C) -> Self {
         Table { base, cells }
-    }
-
-    /// The values at these addresses.
-    fn at<'c, T>(&self, cells: &'c mut [T], address: u16, count: usize) -> Option<&'c mut [T]> {
-        let first = usize::from(address.checked_sub(self.base)?);
-        cells.get_mut(first..)?.get_mut(..count)
     }
 }
 
@@ -125,11 +120,11 @@ fn cells<T>(
     address: u16,
     count: usize,
 ) -> Result<&mut [T], Exception> {
-    let bare = Table::new(table.base, ());
+    let first = address.checked_sub(table.base).map(usize::from);
     match table.cells.as_mut() {
         [] => Err(Exception::IllegalFunction),
-        cells => bare
-            .at(cells, address, count)
+        cells => first
+            .and_then(|first| cells.get_mut(first..)?.get_mut(..count))
             .ok_or(Exception::IllegalDataAddress),
     }
 }
@@ -193,11 +188,5 @@ where
         let cells = cells(&mut self.holding_registers, address, registers.len())?;
         copy(cells, registers);
         Ok(())
-    }
-}
-
-fn copy(to: &mut [u16], from: &[u16]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
     }
 }

@@ -2,9 +2,8 @@
 
 use super::device::Device;
 use super::diagnostics::Diagnostics;
-use super::indication::ANY;
 use super::serve_device::serve;
-use super::units::{dispatch, offer_counted, Dispatch, Units};
+use super::units::{has_in_slice, offer_counted, serve_slice, AnyUnit, Units};
 use super::{Addressing, Indication, Reply};
 
 /// A device with its unit id. [`Server::serve`](super::Server::serve) takes one unit, or a slice or
@@ -35,9 +34,11 @@ impl<D: Device> Unit<D> {
             diagnostics: None,
         }
     }
+}
 
-    fn serves(&self, unit: u8) -> bool {
-        unit == 0 || self.id == unit || self.id == ANY
+impl<D: Device> AnyUnit for Unit<D> {
+    fn id(&self) -> u8 {
+        self.id
     }
 
     fn offer(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply {
@@ -58,38 +59,13 @@ impl<D: Device> Unit<D> {
     }
 }
 
-/// The units, and the frame that they are offered.
-struct Devices<'a, U> {
-    units: U,
-    info: &'a Indication,
-    pdu: &'a mut [u8],
-}
-
-impl<'u, D: Device + 'u, U: Iterator<Item = &'u mut Unit<D>>> Dispatch for Devices<'_, U> {
-    type Unit = &'u mut Unit<D>;
-
-    fn next(&mut self) -> Option<Self::Unit> {
-        self.units.next()
-    }
-
-    fn is_for(&self, unit: &Self::Unit) -> bool {
-        self.info.is_for(unit.id.into())
-    }
-
-    fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
-        Some(unit.offer(self.info, addressing, self.pdu))
-    }
-}
-
 impl<D: Device> Units for [Unit<D>] {
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
-        let all = info.addressing(pdu.first().copied().unwrap_or(0));
-        let units = self.iter_mut();
-        dispatch(&mut Devices { units, info, pdu }, all)
+        serve_slice(self, info, pdu)
     }
 
     fn has(&self, unit: u8) -> bool {
-        self.iter().any(|known| known.serves(unit))
+        has_in_slice(self, unit)
     }
 }
 
@@ -109,6 +85,6 @@ impl<D: Device> Units for Unit<D> {
     }
 
     fn has(&self, unit: u8) -> bool {
-        self.serves(unit)
+        core::slice::from_ref(self).has(unit)
     }
 }

@@ -120,9 +120,12 @@ fn serve_pdu(
     refusal.reply()
 }
 
-impl ServiceUnit<'_> {
-    /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.
-    fn serve(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply {
+impl AnyUnit for ServiceUnit<'_> {
+    fn id(&self) -> u8 {
+        self.id
+    }
+
+    fn offer(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply {
         let services = &mut *self.services;
         let line = self.diagnostics.as_deref_mut();
         offer_counted(line, info, addressing, pdu, |line, pdu, length| {
@@ -156,6 +159,15 @@ pub(super) fn offer_counted(
     reply
 }
 
+/// A unit in a slice.
+pub(super) trait AnyUnit {
+    /// Its unit id.
+    fn id(&self) -> u8;
+
+    /// Serves a frame that is addressed to this unit. Counts any frame in the diagnostics.
+    fn offer(&mut self, info: &Indication, addressing: Addressing, pdu: &mut [u8]) -> Reply;
+}
+
 /// Units in a slice, and the frame that they are offered.
 struct Slice<'a, U> {
     units: U,
@@ -163,30 +175,43 @@ struct Slice<'a, U> {
     pdu: &'a mut [u8],
 }
 
-impl<'u, 'a: 'u, U: Iterator<Item = &'u mut ServiceUnit<'a>>> Dispatch for Slice<'_, U> {
-    type Unit = &'u mut ServiceUnit<'a>;
+impl<'u, A: AnyUnit + 'u, U: Iterator<Item = &'u mut A>> Dispatch for Slice<'_, U> {
+    type Unit = &'u mut A;
 
     fn next(&mut self) -> Option<Self::Unit> {
         self.units.next()
     }
 
     fn is_for(&self, unit: &Self::Unit) -> bool {
-        self.info.is_for(unit.id.into())
+        self.info.is_for(unit.id().into())
     }
 
     fn offer(&mut self, unit: Self::Unit, addressing: Addressing) -> Option<Reply> {
-        Some(unit.serve(self.info, addressing, self.pdu))
+        Some(unit.offer(self.info, addressing, self.pdu))
     }
+}
+
+/// As [`Units::serve`], for units in a slice.
+pub(super) fn serve_slice(units: &mut [impl AnyUnit], info: &Indication, pdu: &mut [u8]) -> Reply {
+    let all = info.addressing(pdu.first().copied().unwrap_or(0));
+    let units = units.iter_mut();
+    dispatch(&mut Slice { units, info, pdu }, all)
+}
+
+/// As [`Units::has`], for units in a slice.
+pub(super) fn has_in_slice(units: &[impl AnyUnit], unit: u8) -> bool {
+    unit == 0
+        || units
+            .iter()
+            .any(|known| known.id() == unit || known.id() == ANY)
 }
 
 impl Units for [ServiceUnit<'_>] {
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
-        let all = info.addressing(pdu.first().copied().unwrap_or(0));
-        let units = self.iter_mut();
-        dispatch(&mut Slice { units, info, pdu }, all)
+        serve_slice(self, info, pdu)
     }
 
     fn has(&self, unit: u8) -> bool {
-        unit == 0 || self.iter().any(|known| known.id == unit || known.id == ANY)
+        has_in_slice(self, unit)
     }
 }
