@@ -1,7 +1,7 @@
 //! How each framing finds a request in the received bytes, and encodes a response.
 
 use super::indication::{SERIAL, STREAM};
-use super::line::{OwnOfFraming, Receive, Server, ServerStorage, READ_AHEAD};
+use super::line::{LatencyOrReadAhead, Receive, Server, ServerStorage, READ_AHEAD};
 use super::{Indication, Reply, Units};
 use crate::error::{Error, Status};
 use crate::frame::ascii::{CharacterKind, Decoded};
@@ -604,7 +604,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     fn keep_read_ahead(&mut self, length: usize) {
         self.read_ahead = self.end as u8 - length as u8;
         if let [a, b, c, d] = *self.storage.slice(length, READ_AHEAD) {
-            self.own_of_framing = OwnOfFraming::read_ahead([a, b, c, d]);
+            self.latency_or_read_ahead = LatencyOrReadAhead::read_ahead([a, b, c, d]);
         }
     }
 
@@ -612,7 +612,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     #[inline(always)]
     fn use_read_ahead(&mut self) {
         if let Some(front) = self.storage.bytes(0, READ_AHEAD).first_chunk_mut() {
-            *front = self.own_of_framing.as_read_ahead();
+            *front = self.latency_or_read_ahead.as_read_ahead();
         }
         self.end = self.read_ahead.into();
         self.read_ahead = 0;

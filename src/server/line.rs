@@ -73,16 +73,16 @@ pub(super) type EncodeAdu<P, B> = fn(&mut Server<P, B>, usize) -> usize;
 /// for as many after each frame that is shorter than what the server reads first.
 pub(super) const READ_AHEAD: usize = 4;
 
-/// What only one kind of framing keeps: a serial line the receive latency (see
-/// [`Server::set_receive_latency`]), TCP the bytes of the next frame, which were read with the last
-/// one. (A field for each takes 4 bytes of RAM more in each server.)
+/// A serial line keeps its receive latency here: see [`Server::set_receive_latency`]. TCP has no such
+/// latency, and keeps the bytes of the next frame that it has read with the last one. (A field for
+/// each takes 4 bytes of RAM more in each server.)
 #[derive(Clone, Copy, Debug)]
-pub(super) struct OwnOfFraming(u32);
+pub(super) struct LatencyOrReadAhead(u32);
 
-impl OwnOfFraming {
+impl LatencyOrReadAhead {
     /// That of a serial line.
-    pub(super) const fn latency(latency: Micros) -> OwnOfFraming {
-        OwnOfFraming(latency)
+    pub(super) const fn latency(latency: Micros) -> LatencyOrReadAhead {
+        LatencyOrReadAhead(latency)
     }
 
     /// The latency of a serial line.
@@ -91,8 +91,8 @@ impl OwnOfFraming {
     }
 
     /// That of a TCP connection.
-    pub(super) fn read_ahead(bytes: [u8; READ_AHEAD]) -> OwnOfFraming {
-        OwnOfFraming(u32::from_ne_bytes(bytes))
+    pub(super) fn read_ahead(bytes: [u8; READ_AHEAD]) -> LatencyOrReadAhead {
+        LatencyOrReadAhead(u32::from_ne_bytes(bytes))
     }
 
     /// The bytes of the next frame of a TCP connection.
@@ -130,14 +130,14 @@ pub struct Server<P, B> {
     pub storage: B,
     /// The end character of ASCII frames.
     pub(super) delimiter: u8,
-    /// Over TCP: how many bytes of the next frame are stored in `own_of_framing`.
+    /// Over TCP: how many bytes of the next frame are stored in `latency_or_read_ahead`.
     pub(super) read_ahead: u8,
     /// On an RTU line: the length of a character in microseconds.
     pub(super) character: Micros16,
     pub(super) now: Micros,
     /// The silence that ends a frame. Set it with [`Server::set_silence`].
     pub silence: Micros,
-    pub(super) own_of_framing: OwnOfFraming,
+    pub(super) latency_or_read_ahead: LatencyOrReadAhead,
     pub(super) receive: Option<Receive<P, B>>,
     pub(super) encode_adu: Option<EncodeAdu<P, B>>,
     /// The byte stream.
@@ -163,7 +163,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
             deadline: 0,
             now: 0,
             silence: time::DEFAULT_SILENCE,
-            own_of_framing: OwnOfFraming::latency(RECEIVE_LATENCY),
+            latency_or_read_ahead: LatencyOrReadAhead::latency(RECEIVE_LATENCY),
             receive: None,
             encode_adu: None,
             storage,
@@ -202,7 +202,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.has_no_echo = false;
         self.sent = 0;
         self.character = UNKNOWN_CHARACTER;
-        self.own_of_framing = OwnOfFraming::latency(RECEIVE_LATENCY);
+        self.latency_or_read_ahead = LatencyOrReadAhead::latency(RECEIVE_LATENCY);
         self.listen();
     }
 
@@ -235,7 +235,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// this time.
     pub fn set_receive_latency(&mut self, milliseconds: u16) {
         if self.keeps_time() {
-            self.own_of_framing = OwnOfFraming::latency(time::millis(milliseconds));
+            self.latency_or_read_ahead = LatencyOrReadAhead::latency(time::millis(milliseconds));
         }
     }
 
@@ -358,7 +358,9 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         self.is_waiting = true;
         self.deadline = start;
         time::add_characters(&mut self.deadline, count + FIFO_TIMEOUT, self.character);
-        self.deadline = self.deadline.wrapping_add(self.own_of_framing.as_latency());
+        self.deadline = self
+            .deadline
+            .wrapping_add(self.latency_or_read_ahead.as_latency());
     }
 
     /// Notes that the line has no echo: after a response, another frame than its echo has come,
