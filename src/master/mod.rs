@@ -15,6 +15,7 @@ pub mod request;
 #[cfg(feature = "embedded-io-async")]
 pub use self::asynchronous::AsyncMaster;
 
+use crate::bytes::copy;
 pub use crate::engine::{
     Buffers, Count, Counter, MicrosSetting, Settings, Storage, Words, COUNTERS,
 };
@@ -107,9 +108,7 @@ impl<P, S: Words> Master<P, S> {
         if self.response().len() < registers.len() {
             return Err(Error::MalformedReply);
         }
-        for (place, word) in registers.iter_mut().zip(self.response()) {
-            *place = *word;
-        }
+        copy(registers, self.response());
         Ok(())
     }
 
@@ -316,9 +315,7 @@ impl<P: Port, S: Words> Master<P, S> {
 /// Copies words into the transmit words, and returns their number. A request refuses a number that
 /// they cannot hold.
 fn put_words<P, S: Words>(line: &mut Line<P, S>, words: &[u16]) -> u16 {
-    for (place, word) in line.storage.transmit().iter_mut().zip(words) {
-        *place = *word;
-    }
+    copy(line.storage.transmit(), words);
     quantity(words.len())
 }
 
