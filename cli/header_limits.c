@@ -36,7 +36,7 @@ int header_is_checked(const header *h, uint16_t at)
 
 /* --- constants --- */
 
-/* A whole number, and whether something of the same sign is beyond it. */
+/* The whole part of a number, without its sign; `has_rest`: the number has a fraction too. */
 typedef struct whole {
     uint64_t amount;
     int is_negative, has_rest;
@@ -51,8 +51,8 @@ static int divide(const decimal_number *number, int32_t divisor, whole *result)
     return decimal_divide(number, by, &result->amount, &result->has_rest);
 }
 
-/* Finds the limit as the registers have it, of a number that is divided by `multiplier` then.
- * Returns 0 if it has too many digits. */
+/* Converts a limit to the number in the registers, times the multiplier of the scale: the caller
+ * divides by that. Returns 0 if the result has too many digits. */
 static int find_raw(const header *h, uint16_t at, const value_scale *limit, int is_step,
                     decimal_number *raw)
 {
@@ -95,8 +95,8 @@ static int is_signed(const header *h, uint16_t at)
     return header_number_type(&h->of->planned[at])[0] == 'i';
 }
 
-/* Rounds a limit to a whole number that the C type of the field, or a longer one, has: the next one
- * above if `round` is 1, the next one below if it is -1. Returns 0 if there is none. */
+/* Rounds a limit to a whole number that the C type of the field, or a longer one, has: up if
+ * `round` is 1, down if it is -1. Returns 0 if there is no such number. */
 static int round_whole(whole *limit, int round, int has_sign)
 {
     if (limit->has_rest && limit->is_negative == (round < 0)) {
@@ -113,7 +113,8 @@ static int round_whole(whole *limit, int round, int has_sign)
     return !has_sign || limit->amount <= INT64_MAX;
 }
 
-/* Finds a limit as a whole number; `round` is 0 for the step. Returns 0 if there is none. */
+/* Converts a limit to a whole number in the registers; `round` is 0 for the step, which must be one
+ * already. Returns 0 if there is no such number. */
 static int find_whole(const header *h, uint16_t at, const value_scale *limit, int round,
                       whole *number)
 {
@@ -164,7 +165,8 @@ static int write_limit(header *h, uint16_t at, const char *suffix, const value_s
     return header_define(h, at, suffix, h->of->fields[at].line);
 }
 
-/* Whether multiples of the step count from a constant that is written, or else from 0. */
+/* Whether a constant of the step makes sense: the step counts from min_value, which must be a whole
+ * number in the registers unless they have a float; or else from 0, which must be 0 there. */
 static int has_base(const header *h, uint16_t at)
 {
     static const value_scale ZERO;
@@ -235,8 +237,7 @@ static int compare_with_type(const header *h, uint16_t at, const whole *limit, i
     return limit->amount >= most ? 1 : 0;
 }
 
-/* What is to be compared: nothing, since each number is within the limit; the number; or nothing,
- * since none is. */
+/* Which numbers of the C type a limit allows. Only for SOME the number is compared. */
 enum { ALL, SOME, NONE };
 
 /* `round` is 1 for the least number, -1 for the greatest. */
@@ -251,7 +252,7 @@ static int what_a_limit_allows(const header *h, uint16_t at, const value_scale *
     if (is_float(h, at))
         return find_raw(h, at, limit, 0, &raw) ? SOME : ALL;
     if (!find_whole(h, at, limit, round, &number)) {
-        /* Beyond what has 64 bits, or negative where the field has no sign. */
+        /* It has more than 64 bits, or it is negative and the C type has no sign. */
         if (!find_raw(h, at, limit, 0, &raw))
             return ALL;
         return (raw.is_negative != (h->scales[at].multiplier < 0)) == (round < 0) ? NONE : ALL;

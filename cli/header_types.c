@@ -350,8 +350,8 @@ static const char *type_as(const mbm_planField *planned)
     return own == 'i' ? "INT64" : "UINT64";
 }
 
-/* Writes what the number is, as a plan describes it: alone in registers, with the power of ten
- * after it. Returns 0 after reporting a refusal. */
+/* Writes the constants that describe the number as a field of a plan: its registers are the first
+ * ones of a view, and those of its power of ten follow. Returns 0 after reporting a refusal. */
 static int write_as(const header *h, uint16_t at, const char *name)
 {
     const mbm_planField *planned = &h->of->planned[at];
@@ -385,8 +385,8 @@ static int write_as(const header *h, uint16_t at, const char *name)
     return 1;
 }
 
-/* Writes the function that takes the number out of the registers of a plan, and the power of ten
- * after it. */
+/* Writes the function that copies the number of a plan, and the power of ten after it, to such a
+ * view. */
 static void write_fetch(const header *h, uint16_t at, const char *name)
 {
     const mbm_planField *planned = &h->of->planned[at];
