@@ -85,7 +85,7 @@ impl Request {
     fn start(self, master: &mut Tried) {
         let started = match self {
             Request::Read => master.start_read_holding_registers(0, 1),
-            Request::Write => master.write_single_register(0, 2),
+            Request::Write => master.start_write_single_register(0, 2),
         };
         assert_eq!(started, Ok(()));
     }
