@@ -5,111 +5,10 @@ use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;
 use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
-use crate::port::Port;
-use core::future::{poll_fn, ready, Future};
-use core::pin::pin;
+use crate::port::AsyncIo;
 use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
-
-/// Bytes that are received in one piece.
-const PIECE: usize = 64;
-
-/// The pause before the next poll while the device does not go on, in microseconds.
-const PAUSE: u32 = 200;
-
-/// What is to be sent.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Outgoing {
-    /// Nothing.
-    None,
-    /// This many bytes of the frame buffer.
-    Frame(u8),
-    /// The device did not take the frame in time.
-    Stuck,
-}
-
-/// The port between the engine, which never waits, and the device, which is awaited. The frame to
-/// send stays in the frame buffer.
-#[derive(Debug)]
-struct Bridge<C, E> {
-    clock: C,
-    driver: E,
-    outgoing: Outgoing,
-    is_lost: bool,
-    received: [u8; PIECE],
-    /// The range of `received` that the engine has not read yet.
-    start: usize,
-    end: usize,
-}
-
-impl<C: FnMut() -> u32, E: FnMut(bool)> Port for Bridge<C, E> {
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
-        let received = self.received.get(self.start..self.end).unwrap_or_default();
-        if received.is_empty() && self.is_lost {
-            return Err(Error::LinkLost);
-        }
-        let mut count = 0;
-        for (place, byte) in bytes.iter_mut().zip(received) {
-            *place = *byte;
-            count += 1;
-        }
-        self.start += count;
-        Ok(count)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
-        // The engine writes the whole frame in one call, as all of it is accepted.
-        let length = bytes.len() as u8;
-        self.outgoing = Outgoing::Frame(length);
-        Ok(length.into())
-    }
-
-    fn micros(&mut self) -> u32 {
-        (self.clock)()
-    }
-
-    fn flush(&mut self) -> bool {
-        self.outgoing == Outgoing::None
-    }
-
-    fn pre_transmission(&mut self) {
-        (self.driver)(true);
-    }
-
-    fn post_transmission(&mut self) {
-        (self.driver)(false);
-    }
-}
-
-impl<C, E> Bridge<C, E> {
-    const fn new(clock: C, driver: E) -> Self {
-        Bridge {
-            clock,
-            driver,
-            outgoing: Outgoing::None,
-            is_lost: false,
-            received: [0; PIECE],
-            start: 0,
-            end: 0,
-        }
-    }
-
-    /// The place for received bytes; empty if the engine has to read first.
-    fn place(&mut self) -> &mut [u8] {
-        if self.start == self.end {
-            self.start = 0;
-            self.end = 0;
-        }
-        self.received.get_mut(self.end..).unwrap_or_default()
-    }
-
-    /// Notes that the device has filled `count` bytes of the place; 0 if it is at its end.
-    fn note_received(&mut self, count: usize) {
-        self.is_lost = count == 0;
-        self.end = (self.end + count).min(PIECE);
-    }
-}
 
 /// A master of one RTU line, whose functions are futures. It has one request at a time.
 ///
@@ -126,9 +25,7 @@ impl<C, E> Bridge<C, E> {
 /// off. The next request can follow at once.
 #[derive(Debug)]
 pub struct AsyncMaster<D, C, T, S: Words, E = fn(bool)> {
-    master: Master<Bridge<C, E>, S>,
-    device: D,
-    timer: T,
+    master: Master<AsyncIo<D, C, T, E>, S>,
 }
 
 impl<D, C: FnMut() -> u32, T, S: Words> AsyncMaster<D, C, T, S> {
@@ -149,10 +46,9 @@ impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> AsyncMaster<D, C, T, S, 
         buffers: S,
         driver: E,
     ) -> Self {
+        let port = AsyncIo::serial_with_driver(device, clock, timer, driver);
         AsyncMaster {
-            master: Master::new(unit, Bridge::new(clock, driver), buffers),
-            device,
-            timer,
+            master: Master::new(unit, port, buffers),
         }
     }
 
@@ -168,7 +64,7 @@ impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> AsyncMaster<D, C, T, S, 
 
     /// The UART.
     pub fn device(&mut self) -> &mut D {
-        &mut self.device
+        &mut self.master.port().device
     }
 
     /// Sets the unit for later requests; 0 means broadcast.
@@ -193,90 +89,19 @@ where
     /// Makes a request, and waits until it has ended.
     async fn request(
         &mut self,
-        start: impl FnOnce(&mut Master<Bridge<C, E>, S>) -> Result<(), Error>,
+        start: impl FnOnce(&mut Master<AsyncIo<D, C, T, E>, S>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         // A future that was forgotten, and not dropped, has left its request.
         self.master.cancel();
-        let port = self.master.port();
-        port.is_lost = false;
-        port.outgoing = Outgoing::None;
+        self.master.port().begin();
         start(&mut self.master)?;
-        let running = Running(self);
-        running.0.take_old_bytes().await;
+        let running = Running(&mut self.master);
+        running.0.port().take_old_bytes().await;
         loop {
-            if let Poll::Ready(result) = running.0.master.poll() {
+            if let Poll::Ready(result) = running.0.poll() {
                 return result;
             }
-            running.0.go_on().await;
-        }
-    }
-
-    /// Takes what arrived before the request, so that the engine does not search it for the reply.
-    async fn take_old_bytes(&mut self) {
-        // A device that has lost characters may say so before it returns the others.
-        for _ in 0..2 {
-            let port = self.master.port();
-            let place = port.place();
-            if place.is_empty() {
-                return;
-            }
-            match first(self.device.read(place), ready(())).await {
-                Some(Ok(count)) => return port.note_received(count),
-                Some(Err(_)) => {}
-                None => return,
-            }
-        }
-    }
-
-    /// Waits until the next poll has something to do.
-    async fn go_on(&mut self) {
-        let line = &mut self.master.line;
-        if let Outgoing::Frame(length) = line.port.outgoing {
-            let settings = &line.settings;
-            let characters = u32::from(settings.any_character()) << 8;
-            let limit = characters.saturating_add(settings.response_timeout.get());
-            let frame = line.storage.slice(0, length);
-            let device = &mut self.device;
-            // Not `write_all`, which panics if the device takes no byte.
-            let send = async {
-                let mut rest = frame;
-                while !rest.is_empty() {
-                    match device.write(rest).await? {
-                        0 => return Ok(false),
-                        sent => rest = rest.get(sent..).unwrap_or_default(),
-                    }
-                }
-                device.flush().await?;
-                Ok::<_, D::Error>(true)
-            };
-            let sent = first(send, self.timer.delay_us(limit)).await;
-            let port = &mut line.port;
-            port.outgoing = match sent {
-                Some(_) => Outgoing::None,
-                None => Outgoing::Stuck,
-            };
-            port.is_lost = matches!(sent, Some(Ok(false) | Err(_)));
-            return;
-        }
-        let delay = self.master.poll_delay();
-        if !self.master.is_waiting() {
-            // The device is stuck, or the driver stays on for `delay`.
-            let pause = if delay == 0 { PAUSE } else { delay };
-            return self.timer.delay_us(pause).await;
-        }
-        if delay == 0 {
-            return;
-        }
-        let port = self.master.port();
-        let place = port.place();
-        if place.is_empty() {
-            return self.timer.delay_us(delay).await;
-        }
-        match first(self.device.read(place), self.timer.delay_us(delay)).await {
-            Some(Ok(count)) => port.note_received(count),
-            // A device that fails at once again must not keep other tasks from running.
-            Some(Err(_)) => self.timer.delay_us(delay.min(PAUSE)).await,
-            None => {}
+            go_on(running.0).await;
         }
     }
 
@@ -293,21 +118,37 @@ where
 
 /// A pending request. If the future that has it is dropped, the request is cancelled.
 struct Running<'a, D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)>(
-    &'a mut AsyncMaster<D, C, T, S, E>,
+    &'a mut Master<AsyncIo<D, C, T, E>, S>,
 );
 
 impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> Drop for Running<'_, D, C, T, S, E> {
     fn drop(&mut self) {
-        self.0.master.cancel();
+        self.0.cancel();
     }
 }
 
-/// The result of `future`; `None` if `timer` has ended before.
-async fn first<F: Future>(future: F, timer: impl Future<Output = ()>) -> Option<F::Output> {
-    let (mut future, mut timer) = (pin!(future), pin!(timer));
-    poll_fn(|context| match future.as_mut().poll(context) {
-        Poll::Ready(result) => Poll::Ready(Some(result)),
-        Poll::Pending => timer.as_mut().poll(context).map(|()| None),
-    })
-    .await
+/// Waits until the next poll has something to do.
+async fn go_on<D, C, T, S, E>(master: &mut Master<AsyncIo<D, C, T, E>, S>)
+where
+    D: Read + Write,
+    C: FnMut() -> u32,
+    T: DelayNs,
+    S: Words,
+    E: FnMut(bool),
+{
+    if let Some(length) = master.port().frame_length() {
+        let line = &mut master.line;
+        let settings = &line.settings;
+        let characters = u32::from(settings.any_character()) << 8;
+        let limit = characters.saturating_add(settings.response_timeout.get());
+        let frame = line.storage.slice(0, length as u8);
+        return line.port.send(frame, limit).await;
+    }
+    let delay = master.poll_delay();
+    if !master.is_waiting() {
+        // The device is stuck, or the driver stays on for `delay`.
+        master.port().pause(delay).await;
+    } else if delay > 0 {
+        master.port().receive(delay).await;
+    }
 }

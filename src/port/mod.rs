@@ -1,10 +1,14 @@
 //! The interface to the UART or socket and to the clock, which the firmware implements.
 
+#[cfg(feature = "embedded-io-async")]
+mod async_io;
 #[cfg(feature = "embedded-io")]
 mod embedded_io;
 #[cfg(feature = "std")]
 mod std_io;
 
+#[cfg(feature = "embedded-io-async")]
+pub use self::async_io::AsyncIo;
 #[cfg(feature = "embedded-io")]
 pub use self::embedded_io::EmbeddedIo;
 #[cfg(feature = "std")]
