@@ -79,7 +79,9 @@ impl DelayNs for Delay {
 type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
 
 /// A master of unit 17.
-fn master(bench: &Bench) -> AsyncMaster<Uart, impl FnMut() -> u32, Delay, Words, impl FnMut(bool)> {
+fn master(
+    bench: &Bench,
+) -> AsyncMaster<Uart, impl FnMut() -> u32 + use<>, Delay, Words, impl FnMut(bool) + use<>> {
     let wire = bench.wire.clone();
     let clock = move || wire.borrow().now;
     let wire = bench.wire.clone();

@@ -60,22 +60,22 @@ impl WriteReady for Uart {
     }
 }
 
-fn clock(wire: &Rc<RefCell<Wire>>) -> impl FnMut() -> u32 {
+fn clock(wire: &Rc<RefCell<Wire>>) -> impl FnMut() -> u32 + use<> {
     let wire = wire.clone();
     move || wire.borrow().now
 }
 
-fn driver(wire: &Rc<RefCell<Wire>>) -> impl FnMut(bool) {
+fn driver(wire: &Rc<RefCell<Wire>>) -> impl FnMut(bool) + use<> {
     let wire = wire.clone();
     move |on| wire.borrow_mut().driver = on
 }
 
-fn serial(bench: &Bench) -> impl Port {
+fn serial(bench: &Bench) -> impl Port + use<> {
     let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
     EmbeddedIo::serial(uart, clock(wire)).with_driver(driver(wire), 115_200)
 }
 
-fn stream(bench: &Bench) -> impl Port {
+fn stream(bench: &Bench) -> impl Port + use<> {
     let (wire, uart) = (&bench.wire, Uart(bench.wire.clone()));
     EmbeddedIo::stream(uart, clock(wire)).with_driver(driver(wire), 115_200)
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 /// How long a test waits for a peer; generous, for a busy machine.
 pub const PEER_TIMEOUT: Duration = Duration::from_secs(60);
 
-extern "C" {
+unsafe extern "C" {
     fn posix_openpt(flags: c_int) -> c_int;
     fn grantpt(fd: c_int) -> c_int;
     fn unlockpt(fd: c_int) -> c_int;
