@@ -14,6 +14,14 @@ need-packages:
 	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross dpkg-dev
 	@scripts/build/archive --packages $(MCUS) atmega4809
 
+# The parts of an SDK for some boards alone: theirs, and the library for this machine.
+.PHONY: sdk-parts
+sdk-parts: export MBM_BOARDS := $(BOARDS)
+sdk-parts:
+	@scripts/need gcc libc6-dev libmbedtls-dev
+	@archives=$$(scripts/build/boards.py --archives) && scripts/build/archive --packages $$archives && \
+		$(MAKE) --no-print-directory -j$$(nproc) linux assembler $$(printf 'build-archive-%s ' $$archives)
+
 .PHONY: dist-parts
 dist-parts: need-packages $(ARCHIVE)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
@@ -31,7 +39,7 @@ PARTS_esp-idf := assembler BOARDS="riscv esp32"
 PARTS_platformio := $(ARCHIVE) assembler
 PARTS_rt-thread := assembler BOARDS="arm riscv"
 PARTS_sbom := $(ARCHIVE)
-PARTS_sdk := dist-parts
+PARTS_sdk := $(if $(BOARDS),sdk-parts BOARDS="$(BOARDS)",dist-parts)
 PARTS_source :=
 PARTS_zephyr := assembler BOARDS="arm riscv"
 KIND ?=
@@ -42,6 +50,23 @@ package: ## Write the packages of one kind to dist/, KIND=arduino, crates, debia
 	@$(if $(PARTS_$(KIND)),$(MAKE) --no-print-directory $(PARTS_$(KIND)))
 	@mkdir -p dist
 	@packaging/$(KIND)/pack dist
+
+# The packages that people ask for by name. BOARDS are boards, families of boards or archives.
+BOARDS ?=
+.PHONY: sdk deb single
+sdk: export MBM_BOARDS := $(BOARDS)
+sdk: ## Write the C SDK to dist/; BOARDS="uno cortex-m4" for these boards alone
+	@$(MAKE) --no-print-directory package KIND=sdk BOARDS="$(BOARDS)"
+
+deb: ## Write the Debian packages of this machine to dist/: mbm, libmbm0 and libmbm-dev
+	@$(MAKE) --no-print-directory package KIND=debian
+
+BOARD ?=
+PARTS ?=
+single: ## Write mbm.h and mbm.S, the library for BOARD in two files, to dist/single; PARTS="master ring": these headers alone
+	@[ "$(BOARD)" ] || { echo "single: BOARD is one of $$(scripts/build/boards.py --list)" >&2; exit 1; }
+	@$(MAKE) --no-print-directory assembler BOARDS="$(BOARD)"
+	@scripts/build/single $(BOARD) "dist/single/$(BOARD)$(if $(PARTS),-$(subst $(eval ) ,-,$(strip $(PARTS))))" $(PARTS)
 
 KINDS ?=
 .PHONY: check-dist

@@ -1,10 +1,10 @@
 # The Arduino library, and sketches on simulated AVR boards.
 
-# BOARDS names families of boards, for a library without the others and their compilers.
+# BOARDS names boards or families of boards, for a library without the others and their compilers.
 assembler library arduino-zip: export MBM_BOARDS := $(BOARDS)
 
 .PHONY: assembler
-assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler; BOARDS="avr esp32" for some
+assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler; BOARDS="uno esp32" for some
 	@scripts/build/assembler
 
 .PHONY: library
@@ -12,7 +12,7 @@ library: assembler
 	@packaging/arduino/library
 
 .PHONY: arduino-zip
-arduino-zip: library ## Pack the Arduino library into a zip in dist/; BOARDS=avr, arm, riscv, esp8266 or esp32 for these boards alone
+arduino-zip: library ## Pack the Arduino library into a zip in dist/; BOARDS="uno pico" for these boards alone
 	@mkdir -p dist
 	@packaging/arduino/pack dist
 

@@ -16,8 +16,11 @@ $(QEMU_TESTS) $(RUST_QEMU_TEST): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(
 	@gcc $(QEMU_FLAGS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
 
-# The images with the library as assembler source.
+# The images with the library as two files, mbm.h and mbm.S, with the parts that the program includes.
 FROM_SOURCE := $(BUILD)/baremetal-source
+SINGLE_PARTS_main := master
+SINGLE_PARTS_serve := server values
+SINGLE_PARTS_client := client ring
 
 .PHONY: test-firmware-rust
 test-firmware-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io
@@ -39,13 +42,16 @@ test-firmware-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	@$(MAKE) -s --no-print-directory assembler
 	@set -e; \
 	build() { \
-		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$1 PROGRAM=$$2 \
-			OUT=$(FROM_SOURCE)/$$1 SOURCE=$(BUILD)/assembler; \
+		machine=$$1 program=$$2; shift 2; \
+		scripts/build/single "$$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine)" \
+			$(FROM_SOURCE)/single-$$machine-$$program "$$@" >/dev/null; \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=$$program \
+			OUT=$(FROM_SOURCE)/$$machine SOURCE=$(FROM_SOURCE)/single-$$machine-$$program; \
 	}; \
-	for machine in $(MACHINES); do build $$machine main; build $$machine serve; done; \
-	for variant in $(VARIANTS); do build $$variant main; done
+	for machine in $(MACHINES); do build $$machine main $(SINGLE_PARTS_main); build $$machine serve $(SINGLE_PARTS_serve); done; \
+	for variant in $(VARIANTS); do build $$variant main $(SINGLE_PARTS_client); done
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
 	@$(MAKE) -s --no-print-directory test-firmware-rust
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
 	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
-	@echo "test-firmware-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from assembler source"
+	@echo "test-firmware-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from mbm.S"

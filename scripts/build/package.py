@@ -14,7 +14,8 @@ import tarfile
 import zipfile
 
 sys.dont_write_bytecode = True
-from project import ROOT, SETS, fact, licence, sets, version  # noqa: E402
+from boards import SETS, sets  # noqa: E402
+from project import ROOT, fact, licence, version  # noqa: E402
 
 # The time of all files in archives, 1980-01-02. Some file systems have no time before 1980.
 TIME = 315619200

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
-"""Facts about the project, for the scripts that write packages and pages: its version, its licence,
-the entries of packaging/project.toml, and the instruction sets for which the library has assembler source.
+"""Facts about the project, for the scripts that write packages and pages: its version, its licence
+and the entries of packaging/project.toml. boards.py knows the boards.
 
   project.py           writes the project's address into the links to its releases and into Cargo.toml, and how a
                        reader gets mbm into the pages that a user begins with
   project.py --check   fails if something else stands there
 """
 
-import os
 import pathlib
 import re
 import subprocess
@@ -34,76 +33,6 @@ def licence() -> str:
             f"{mit}\n{'-' * 78}\n\n{apache}")
 
 
-class Set(NamedTuple):
-    """mcu: the archive with this code. kind: the dialect of the assembler source. guard: the
-    preprocessor condition for the user's compiler. what: the boards, as a text for users."""
-    mcu: str
-    kind: str
-    guard: str
-    what: str
-
-
-SETS = {
-    "avr5": Set("atmega328p", "avr", "defined(__AVR_ARCH__) && (__AVR_ARCH__ == 5 || __AVR_ARCH__ == 51)",
-                "AVR of 16 to 128 KB of flash (Uno, Nano, Leonardo, 1284P)"),
-    "avr6": Set("atmega2560", "avr", "defined(__AVR_ARCH__) && __AVR_ARCH__ == 6",
-                "AVR of 256 KB of flash (Mega 2560)"),
-    # Chips of at most 8 KB lack the long calls, and the memory for a sketch.
-    "avrxmega3": Set("atmega4809", "avr",
-                     "defined(__AVR_ARCH__) && __AVR_ARCH__ == 103 && defined(__AVR_HAVE_JMP_CALL__)",
-                     "AVR of the series 0, 1 and 2 from 16 KB (Nano Every, Uno WiFi R2, ATtiny1616)"),
-    # This code runs on every Cortex-M. It is also the code for cores that give the processor to
-    # the C++ compiler, but not to the assembler: arduino-pico before 4.1, and some for SAMD.
-    "armv6m": Set("cortex-m0plus", "arm",
-                  "defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)"
-                  " || (defined(__ASSEMBLER__) && defined(ARDUINO) && defined(__ARM_ARCH_4T__))",
-                  "Cortex-M0, M0+ and M23 (Zero, MKR, RP2040)"),
-    "armv7m": Set("cortex-m3", "arm",
-                  "defined(__ARM_ARCH_7M__) || defined(__ARM_ARCH_7EM__) || defined(__ARM_ARCH_8M_MAIN__)"
-                  " || defined(__ARM_ARCH_8_1M_MAIN__)",
-                  "Cortex-M3, M4, M7 and M33 (Due, UNO R4, Nano 33 BLE, GIGA, Teensy, RP2350)"),
-    "rv32imc": Set("riscv32imc", "riscv",
-                   "defined(__riscv_xlen) && __riscv_xlen == 32 && defined(__riscv_mul) && !defined(__riscv_32e)",
-                   "RISC-V of 32 bits with multiplication (ESP32-C2, C3, C5, C6, H2, P4, RP2350)"),
-    "esp8266": Set("esp8266", "xtensa", "defined(__XTENSA__) && defined(__XTENSA_CALL0_ABI__)", "ESP8266"),
-    "esp32": Set("esp32", "bytes", "defined(__XTENSA__) && defined(__XTENSA_WINDOWED_ABI__)",
-                 "ESP32, ESP32-S2 and ESP32-S3"),
-}
-
-
-# The families of boards, with the dialects of SETS that they need, and the names of their Arduino cores.
-FAMILIES = {
-    "avr": (("avr",), ["avr", "megaavr"]),
-    "arm": (("arm",), ["sam", "samd", "samd_beta", "stm32", "STM32F1", "STM32F4", "nrf52", "nRF5", "mbed", "mbed_edge",
-                       "mbed_giga", "mbed_nano", "mbed_nicla", "mbed_opta", "mbed_portenta", "mbed_rp2040", "rp2040",
-                       "renesas", "renesas_uno", "renesas_portenta", "teensy"]),
-    "riscv": (("riscv",), ["rp2040", "esp32"]),
-    "esp8266": (("xtensa",), ["esp8266"]),
-    # Some of them are RISC-V.
-    "esp32": (("bytes", "riscv"), ["esp32"]),
-}
-
-
-def families() -> list:
-    """The families of boards for which the Arduino library is built: those that MBM_BOARDS names, or all."""
-    named = os.environ.get("MBM_BOARDS", "").split()
-    for name in named:
-        if name not in FAMILIES:
-            sys.exit(f"BOARDS: \"{name}\" is no family of boards: there are {', '.join(FAMILIES)}")
-    return [name for name in FAMILIES if name in named or not named]
-
-
-def sets() -> dict:
-    """The rows of SETS of these families."""
-    kinds = [kind for name in families() for kind in FAMILIES[name][0]]
-    return {name: row for name, row in SETS.items() if row.kind in kinds}
-
-
-def architectures() -> list:
-    """The Arduino cores that are known to have boards of these families."""
-    return list(dict.fromkeys(name for family in families() for name in FAMILIES[family][1]))
-
-
 # --- the address of the project and whether it has releases, both set in packaging/project.toml
 
 ADDRESS = [(re.compile(r"https?://[^\s()]+(?=/releases/latest\b)"), ["README.md", "docs/*.md"]),
@@ -123,9 +52,10 @@ class Way(NamedTuple):
 RELEASE = "from the [latest release](ADDRESS/releases/latest)"
 
 
-def guide(what: str, file: str, command: str, more: str = "") -> Way:
+def guide(what: str, file: str, command: str, more: str = "", quick: str = "") -> Way:
+    """`quick` says how a reader gets the part for one board in less time."""
     return Way(f"Download {what}, `{file}`,{more} {RELEASE}.",
-               f"No release is published yet: in a clone of mbm, `{command}` writes {what}, `{file}`, to the folder `dist`.")
+               f"No release is published yet: in a clone of mbm, `{command}` writes {what}, `{file}`, to the folder `dist`{quick}.")
 
 
 SDK = "mbm-sdk-VERSION.tar.gz"
@@ -134,14 +64,17 @@ WAYS = {
                      "No release is published yet: **[make the packages from a clone](#install)**, then start with"),
     "docs/index.md": Way("**[Download](ADDRESS/releases/latest)** then start with",
                          "**[Make it from a clone](../README.md#install)** as no release is published yet, then start with"),
-    "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip"),
+    "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip", quick=", in a quarter of an "
+                                   "hour; `make arduino-zip BOARDS=uno` writes that for one board, `mbm-arduino-VERSION-uno.zip`, in a "
+                                   "minute"),
     "docs/guide-esp-idf.md": guide("the component", "mbm-esp-idf-VERSION.tar.gz", "make package KIND=esp-idf"),
     "docs/guide-platformio.md": guide("the package", "mbm-platformio-VERSION.tar.gz", "make package KIND=platformio"),
     "docs/guide-linux.md": Way(f"Download the C SDK, `{SDK}`, or the Debian packages `libmbm-dev` and `libmbm0`, {RELEASE}.",
                                "No release is published yet: in a clone of mbm, `make install` installs the library, "
-                               "`make package KIND=debian` writes the Debian packages `libmbm-dev` and `libmbm0` to the folder `dist`, and "
-                               f"`make package KIND=sdk` the C SDK, `{SDK}`."),
-    "docs/guide-mcu.md": guide("the C SDK", SDK, "make package KIND=sdk"),
+                               "`make deb` writes the Debian packages `libmbm-dev` and `libmbm0` to the folder `dist`, and "
+                               f"`make sdk` the C SDK, `{SDK}`."),
+    "docs/guide-mcu.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=cortex-m4` writes "
+                               "that for one board, `mbm-sdk-VERSION-cortex-m4.tar.gz`, in a minute"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
     "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",
                               "No release is published yet: `cargo add mbm --path FOLDER` takes the crate from a clone of mbm, and "

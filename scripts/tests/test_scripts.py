@@ -322,20 +322,23 @@ class Compiler(unittest.TestCase):
 
 # --- the packages and the families of boards of the Arduino library
 
+boards = load("scripts/build/boards.py")
+
+
 class Boards(unittest.TestCase):
     """Runs scripts/build/assembler on a system that lacks packages: `dpkg-query` says which."""
 
-    def assemble(self, missing, boards=""):
+    def assemble(self, missing, named=""):
         with tempfile.TemporaryDirectory() as folder:
             program(pathlib.Path(folder) / "dpkg-query",
                     f"case {' '.join(missing)} in *$4*) exit 1 ;; esac", "echo install ok installed")
             return subprocess.run([ROOT / "scripts/build/archive", "--packages", *(
-                row.mcu for row in project.SETS.values() if row.kind in self.kinds(boards))],
+                row.mcu for row in boards.SETS.values() if row.kind in self.kinds(named))],
                 env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "MBM_INSTALL": "no"}, capture_output=True, text=True)
 
-    def kinds(self, boards):
-        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": boards}):
-            return {row.kind for row in project.sets().values()}
+    def kinds(self, named):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": named}):
+            return {row.kind for row in boards.sets().values()}
 
     def test_a_package_that_only_the_last_build_needs_is_named_before_the_first(self):
         found = self.assemble(["llvm-22"])
@@ -351,14 +354,35 @@ class Boards(unittest.TestCase):
         self.assertEqual(self.kinds("avr"), {"avr"})
         self.assertEqual(self.kinds("arm esp8266"), {"arm", "xtensa"})
         self.assertEqual(self.kinds("esp32"), {"bytes", "riscv"})
-        self.assertEqual(self.kinds(""), {row.kind for row in project.SETS.values()})
+        self.assertEqual(self.kinds(""), {row.kind for row in boards.SETS.values()})
 
     def test_every_dialect_belongs_to_a_family(self):
-        self.assertEqual({kind for kinds, _ in project.FAMILIES.values() for kind in kinds}, {row.kind for row in project.SETS.values()})
+        self.assertEqual({kind for kinds, _ in boards.FAMILIES.values() for kind in kinds}, {row.kind for row in boards.SETS.values()})
 
-    def test_a_family_that_is_not_there_is_refused(self):
-        with self.assertRaisesRegex(SystemExit, 'BOARDS: "uno" is no family of boards: there are avr, arm'):
-            self.kinds("uno")
+    def test_a_board_needs_its_own_instruction_set_alone(self):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "uno pico2"}):
+            self.assertEqual(list(boards.sets()), ["avr5", "armv7m"])
+            self.assertEqual(boards.named_archives(), ["atmega328p", "cortex-m33"])
+
+    def test_a_board_may_be_written_in_capitals_and_with_other_hyphens(self):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "ESP32-C3 Nano_Every"}):
+            self.assertEqual(boards.named(), ["esp32c3", "nano-every"])
+
+    def test_a_family_has_the_cores_of_arduino_that_it_names_and_a_board_those_of_its_instruction_set(self):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "esp32"}):
+            self.assertEqual(boards.architectures(), ["esp32"])
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "uno"}):
+            self.assertEqual(boards.architectures(), ["avr", "megaavr"])
+
+    def test_every_archive_belongs_to_an_instruction_set(self):
+        built = subprocess.run([ROOT / "scripts/build/archive", "--list"], check=True, capture_output=True, text=True).stdout.split()
+        # The Nano Every takes assembler source.
+        self.assertEqual(sorted(boards.archives()), sorted([*built, "atmega4809"]))
+        self.assertEqual(set(boards.BOARDS) - set(boards.archives()), set())
+
+    def test_a_board_that_is_not_there_is_refused_with_the_nearest_names(self):
+        with self.assertRaisesRegex(SystemExit, 'there is no board or family "unno"; the nearest names are uno'):
+            self.kinds("unno")
 
 
 # --- the SBOM

@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""The boards that mbm has code for: the instruction sets with a file of assembler source, the families of boards,
+and boards by the names that people use. MBM_BOARDS says for which of them a package is built: names of families,
+boards and archives, such as "uno cortex-m4"; all if it is empty.
+
+  boards.py --archives   prints the archives that the C SDK has for these boards
+  boards.py --list       prints the names that MBM_BOARDS may have
+"""
+
+import difflib
+import os
+import pathlib
+import subprocess
+import sys
+from typing import NamedTuple
+
+FOLDER = pathlib.Path(__file__).resolve().parent
+
+
+class Set(NamedTuple):
+    """An instruction set with a file of assembler source. mcu: the archive with this code. others: the archives
+    whose boards take this file too. kind: the dialect. guard: the preprocessor condition for the user's compiler.
+    what: the boards, as a text for users."""
+    mcu: str
+    others: str
+    kind: str
+    guard: str
+    what: str
+
+
+SETS = {
+    "avr5": Set("atmega328p", "atmega168 atmega32u4", "avr", "defined(__AVR_ARCH__) && (__AVR_ARCH__ == 5 || __AVR_ARCH__ == 51)",
+                "AVR of 16 to 128 KB of flash (Uno, Nano, Leonardo, 1284P)"),
+    "avr6": Set("atmega2560", "", "avr", "defined(__AVR_ARCH__) && __AVR_ARCH__ == 6",
+                "AVR of 256 KB of flash (Mega 2560)"),
+    # Chips of at most 8 KB lack the long calls, and the memory for a sketch.
+    "avrxmega3": Set("atmega4809", "", "avr",
+                     "defined(__AVR_ARCH__) && __AVR_ARCH__ == 103 && defined(__AVR_HAVE_JMP_CALL__)",
+                     "AVR of the series 0, 1 and 2 from 16 KB (Nano Every, Uno WiFi R2, ATtiny1616)"),
+    # This code runs on every Cortex-M. It is also the code for cores that give the processor to
+    # the C++ compiler, but not to the assembler: arduino-pico before 4.1, and some for SAMD.
+    "armv6m": Set("cortex-m0plus", "cortex-m0", "arm",
+                  "defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)"
+                  " || (defined(__ASSEMBLER__) && defined(ARDUINO) && defined(__ARM_ARCH_4T__))",
+                  "Cortex-M0, M0+ and M23 (Zero, MKR, RP2040)"),
+    "armv7m": Set("cortex-m3", "cortex-m4 cortex-m7 cortex-m33", "arm",
+                  "defined(__ARM_ARCH_7M__) || defined(__ARM_ARCH_7EM__) || defined(__ARM_ARCH_8M_MAIN__)"
+                  " || defined(__ARM_ARCH_8_1M_MAIN__)",
+                  "Cortex-M3, M4, M7 and M33 (Due, UNO R4, Nano 33 BLE, GIGA, Teensy, RP2350)"),
+    "rv32imc": Set("riscv32imc", "riscv32imac esp32c3 esp32c6", "riscv",
+                   "defined(__riscv_xlen) && __riscv_xlen == 32 && defined(__riscv_mul) && !defined(__riscv_32e)",
+                   "RISC-V of 32 bits with multiplication (ESP32-C2, C3, C5, C6, H2, P4, RP2350)"),
+    "esp8266": Set("esp8266", "", "xtensa", "defined(__XTENSA__) && defined(__XTENSA_CALL0_ABI__)", "ESP8266"),
+    "esp32": Set("esp32", "", "bytes", "defined(__XTENSA__) && defined(__XTENSA_WINDOWED_ABI__)",
+                 "ESP32, ESP32-S2 and ESP32-S3"),
+}
+
+
+# The families of boards, with the dialects of SETS that they need, and the names of their Arduino cores.
+FAMILIES = {
+    "avr": (("avr",), ["avr", "megaavr"]),
+    "arm": (("arm",), ["sam", "samd", "samd_beta", "stm32", "STM32F1", "STM32F4", "nrf52", "nRF5", "mbed", "mbed_edge",
+                       "mbed_giga", "mbed_nano", "mbed_nicla", "mbed_opta", "mbed_portenta", "mbed_rp2040", "rp2040",
+                       "renesas", "renesas_uno", "renesas_portenta", "teensy"]),
+    "riscv": (("riscv",), ["rp2040", "esp32"]),
+    "esp8266": (("xtensa",), ["esp8266"]),
+    # Some of them are RISC-V.
+    "esp32": (("bytes", "riscv"), ["esp32"]),
+}
+
+# Boards and series of chips, by the archive for their processor.
+BOARDS = {
+    "atmega328p": "uno nano pro-mini",
+    "atmega32u4": "leonardo micro",
+    "atmega2560": "mega",
+    "atmega4809": "nano-every uno-wifi-r2",
+    "cortex-m0": "microbit stm32f0",
+    "cortex-m0plus": "pico rp2040 zero mkr stm32g0 stm32l0 teensy-lc",
+    "cortex-m3": "bluepill due stm32f1",
+    "cortex-m4": "blackpill uno-r4 nano-33-ble microbit-v2 nrf52 samd51 stm32f3 stm32f4 stm32g4 stm32l4 teensy3",
+    "cortex-m7": "giga portenta stm32f7 stm32h7 teensy4",
+    "cortex-m33": "pico2 rp2350 stm32h5 stm32u5",
+    "esp32": "esp32s2 esp32s3",
+    "esp32c6": "esp32c5 esp32h2",
+    "esp8266": "nodemcu d1-mini",
+}
+
+
+# The archive that a C project takes for the processor of another one, as packaging/sdk/target.h says.
+TAKEN = {
+    "atmega168": "atmega328p",
+    "atmega32u4": "atmega328p",
+    "cortex-m0plus": "cortex-m0",
+    "cortex-m7": "cortex-m4",
+    "esp32c3": "riscv32imc",
+    "esp32c6": "riscv32imac",
+}
+
+
+def set_of(archive: str) -> str:
+    """The instruction set whose file serves the boards of an archive."""
+    return next(name for name, row in SETS.items() if archive in [row.mcu, *row.others.split()])
+
+
+def archives() -> list:
+    return [archive for row in SETS.values() for archive in [row.mcu, *row.others.split()]]
+
+
+def plain(name: str) -> str:
+    """A name without what people write differently: ESP32-C3 is esp32c3."""
+    return name.lower().replace("-", "").replace("_", "")
+
+
+def archive_of(board: str) -> str | None:
+    """The archive for a board, which may be named by its archive itself; None if there is no such board."""
+    every = {name: archive for archive in archives() for name in [archive, *BOARDS.get(archive, "").split()]}
+    return next((archive for name, archive in every.items() if plain(name) == plain(board)), None)
+
+
+def names() -> list:
+    """All names that MBM_BOARDS may have."""
+    boards = [board for row in BOARDS.values() for board in row.split()]
+    return list(dict.fromkeys([*FAMILIES, *archives(), *boards]))
+
+
+def refuse(name: str) -> None:
+    near = difflib.get_close_matches(name.lower(), names(), 3)
+    hint = f"; the nearest names are {', '.join(near)}" if near else ""
+    sys.exit(f"boards: there is no board or family \"{name}\"{hint}. `scripts/build/boards.py --list` prints all names")
+
+
+def named() -> list:
+    """What MBM_BOARDS names. Ends the program if it does not know one of the names."""
+    known = {plain(name): name for name in names()}
+    words = os.environ.get("MBM_BOARDS", "").split()
+    for word in words:
+        if plain(word) not in known:
+            refuse(word)
+    return [known[plain(word)] for word in words]
+
+
+def set_names(word: str) -> list:
+    """The instruction sets of a family or a board."""
+    if word in FAMILIES:
+        return [name for name, row in SETS.items() if row.kind in FAMILIES[word][0]]
+    return [set_of(archive_of(word))]
+
+
+def sets() -> dict:
+    """The rows of SETS of the named boards."""
+    chosen = [name for word in named() for name in set_names(word)]
+    return {name: row for name, row in SETS.items() if name in chosen or not named()}
+
+
+def named_archives() -> list:
+    """The archives that the C SDK has for the named boards: those that a C project takes for them, or all. A board
+    without one takes assembler source."""
+    built = subprocess.run([FOLDER / "archive", "--list"], check=True, text=True, stdout=subprocess.PIPE).stdout.split()
+    chosen = []
+    for word in named():
+        which = [SETS[name] for name in set_names(word)]
+        chosen += [archive_of(word)] if word not in FAMILIES else \
+            [archive for row in which for archive in [row.mcu, *row.others.split()]]
+    taken = [TAKEN.get(archive, archive) for archive in chosen]
+    return [archive for archive in built if archive in taken or not named()]
+
+
+def architectures() -> list:
+    """The Arduino cores that are known to have these boards: those of a family, and for a board those of every family
+    with its instruction set."""
+    chosen = []
+    for word in named() or list(FAMILIES):
+        kinds = {SETS[name].kind for name in set_names(word)}
+        chosen += [word] if word in FAMILIES else [family for family in FAMILIES if kinds & set(FAMILIES[family][0])]
+    return list(dict.fromkeys(core for family in FAMILIES if family in chosen for core in FAMILIES[family][1]))
+
+
+def main() -> None:
+    if sys.argv[1:] == ["--list"]:
+        print(*names())
+    elif sys.argv[1:] == ["--archives"]:
+        print(*named_archives())
+    else:
+        sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    main()
