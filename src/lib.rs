@@ -245,6 +245,7 @@ mod atomic {
 }
 
 mod bytes;
+// Its types are at the root of the crate.
 #[doc(hidden)]
 pub mod error;
 pub mod port;

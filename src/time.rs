@@ -48,12 +48,12 @@ pub const fn elapsed(now: u32, since: u32) -> u32 {
 /// clock stepped back a little. (One comparison, because 32-bit comparisons cost much on an
 /// AVR.)
 #[inline(always)]
-pub const fn has_elapsed(time: u32, now: u32, since: u32) -> bool {
+pub(crate) const fn has_elapsed(time: u32, now: u32, since: u32) -> bool {
     now.wrapping_sub(since).wrapping_add(STEP_BACK) >= time.wrapping_add(STEP_BACK)
 }
 
 /// Limits a duration that the caller chose to [`LONGEST`].
-pub const fn clamped(microseconds: u32) -> u32 {
+pub(crate) const fn clamped(microseconds: u32) -> u32 {
     if microseconds > LONGEST {
         LONGEST
     } else {
@@ -74,7 +74,7 @@ pub const LONGEST_TIMEOUT_MS: u32 = 1_000_000;
 /// Converts a timeout in milliseconds to microseconds. One above [`LONGEST_TIMEOUT_MS`] counts
 /// as that.
 #[inline(always)]
-pub const fn timeout_at_most(milliseconds: u32) -> u32 {
+pub(crate) const fn timeout_at_most(milliseconds: u32) -> u32 {
     if milliseconds > LONGEST_TIMEOUT_MS {
         LONGEST_TIMEOUT_MS * 1000
     } else {
@@ -109,7 +109,7 @@ pub const fn character(baud: u32) -> u16 {
 /// Adds `count` characters of `character` microseconds to a time. (A 32-bit multiplication costs 84
 /// bytes of flash on an AVR. Two additions in memory a character do without.)
 #[inline(always)]
-pub fn add_characters<N>(time: &mut u32, count: N, character: u16)
+pub(crate) fn add_characters<N>(time: &mut u32, count: N, character: u16)
 where
     N: Copy + Ord + From<u8> + AddAssign + Into<usize>,
 {
@@ -129,6 +129,8 @@ where
 /// character may have 10 bits instead of 11, clocks differ, and a program that sleeps for this
 /// time may wake up late, though the driver must go off in time. 0 if `character` is 0, the
 /// length of an unknown one.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn sure_to_be_sending(character: u16, count: u16) -> u32 {
     character as u32 * (count - count / 8).saturating_sub(1) as u32
 }

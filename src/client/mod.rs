@@ -21,22 +21,33 @@ mod transaction;
 mod units;
 
 pub use blocking::BlockingClient;
-pub use call::{Call, CommEventCounter, CommEventLog, ReadRecords, WriteRecords, CALL_BYTES};
+// Only the calls of a client that waits have it.
+#[doc(hidden)]
+pub use call::Call;
+pub use call::{CommEventCounter, CommEventLog, ReadRecords, WriteRecords, CALL_BYTES};
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub use link::{Link, LinkEvent, LinkHooks, LinkState, MOST_REPLACE_AFTER};
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub use policy::{again, again_when_busy};
 pub use policy::{Backoff, Policy, Waits, NO_RETRIES};
+// A client has it inside.
+#[doc(hidden)]
 pub use queue::RequestQueue;
 pub use ready::Request;
 pub use request::{ClientRequest, Refused, RequestState};
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub use serial::late_rest;
 pub use storage::{ClientStorage, TcpBuffers};
 pub use tcp::{Tcp, TolerantTcp, ACCEPT_TRANSACTION, ACCEPT_UNIT};
+// `Serial` is a name of it.
 #[doc(hidden)]
 pub use transaction::ClientTransaction;
 pub use transaction::Serial;
 pub use units::UnitRecord;
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub use units::{find, note, rest};
 
@@ -204,16 +215,24 @@ pub trait Transport<J> {
     type Storage;
 
     /// See [`Client::settings`](Client::settings).
+    // The client calls it.
+    #[doc(hidden)]
     fn settings(&mut self) -> &mut Settings;
 
     /// See [`Client::port`](Client::port).
+    // The client calls it.
+    #[doc(hidden)]
     fn port(&mut self) -> &mut Self::Port;
 
     /// See [`Client::storage`](Client::storage).
+    // The client calls it.
+    #[doc(hidden)]
     fn storage(&mut self) -> &mut Self::Storage;
 
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
     /// true in the first call of each poll, when new bytes may have arrived.
+    // The client calls it.
+    #[doc(hidden)]
     fn advance<const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -223,21 +242,31 @@ pub trait Transport<J> {
 
     /// Discards the state of one request in flight; with `None`, of all requests and of
     /// all partly received or partly sent frames.
+    // The client calls it.
+    #[doc(hidden)]
     fn release(&mut self, request: Option<&J>);
 
     /// Forgets which units may still answer earlier requests: the link is a new one, on which they
     /// cannot come.
+    // The client calls it.
+    #[doc(hidden)]
     fn forget_late_replies(&mut self) {}
 
     /// True if no bytes of cancelled requests wait to be sent.
+    // The client calls it.
+    #[doc(hidden)]
     fn is_idle(&self) -> bool {
         true
     }
 
     /// Microseconds until the line has something to do; `None` if the queue decides.
+    // The client calls it.
+    #[doc(hidden)]
     fn delay(&mut self, now: u32) -> Option<u32>;
 
     /// See [`Client::suspend`](Client::suspend).
+    // The client calls it.
+    #[doc(hidden)]
     fn suspend<const N: usize>(&self, queue: &mut RequestQueue<J, N>) -> bool
     where
         J: ClientRequest,
@@ -248,6 +277,8 @@ pub trait Transport<J> {
     }
 
     /// See [`Client::poll_delay`](Client::poll_delay).
+    // The client calls it.
+    #[doc(hidden)]
     fn poll_delay<const N: usize>(&mut self, queue: &RequestQueue<J, N>, now: u32) -> u32
     where
         J: ClientRequest,

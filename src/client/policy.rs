@@ -21,6 +21,8 @@ pub enum Backoff {
 
 impl Backoff {
     /// The backoff for a number from C; `None` if the number is not 0 to 3.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn from_code(code: u8) -> Option<Backoff> {
         match code {
             0 => Some(Backoff::None),

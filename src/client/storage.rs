@@ -11,6 +11,8 @@ use crate::time::{elapsed, timeout_at_most};
 pub trait ClientStorage: Storage<Count = u16> {
     /// The bytes of [`ClientStorage::outgoing`] from index `from` to before index `to`. The client
     /// ensures that `from` <= `to` <= length of the buffer.
+    // The storage of C does this in another way.
+    #[doc(hidden)]
     fn to_send(&mut self, from: u16, to: u16) -> &mut [u8] {
         let bytes = self.outgoing().get_mut(from.into()..to.into());
         bytes.unwrap_or_default()
@@ -32,24 +34,32 @@ pub trait ClientStorage: Storage<Count = u16> {
     }
 
     /// Microseconds until the unit may get its next request.
+    // The storage of C does this in another way.
+    #[doc(hidden)]
     fn rest(&mut self, unit: u8, now: u32) -> u32 {
         rest(self.units_mut(), unit, now)
     }
 
     /// Records that a request to a unit ended with `status`. `again` is true if the
     /// client will retry it.
+    // The storage of C does this in another way.
+    #[doc(hidden)]
     fn note(&mut self, unit: u8, status: Status, again: bool, now: u32) {
         note(self.units_mut(), unit, status, again, now);
     }
 
     /// The response timeout of a unit in milliseconds; 0 for that of the line. The client has
     /// just called [`ClientStorage::rest`] for the unit.
+    // The storage of C does this in another way.
+    #[doc(hidden)]
     fn unit_timeout_ms(&self, unit: u8) -> u32 {
         find(self.units(), unit).map_or(0, |unit| unit.timeout_ms)
     }
 
     /// Microseconds to wait before the next retry of a request that ended with `status`;
     /// `None` if the request is not retried.
+    // The storage of C does this in another way.
+    #[doc(hidden)]
     fn again(&mut self, policy: &Policy, state: &RequestState, status: Status) -> Option<u32> {
         if status.is_exception() {
             return again_when_busy(policy, state, status);

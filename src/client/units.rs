@@ -52,6 +52,8 @@ impl UnitRecord {
     }
 
     /// False for a unit id or a timeout that is too large.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn is_in_range(&self) -> bool {
         self.unit <= u8::MAX as u16 && self.timeout_ms <= LONGEST_TIMEOUT_MS
     }

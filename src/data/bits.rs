@@ -5,6 +5,8 @@ use crate::error::Error;
 
 /// Writes the bits of `words` as data bytes, and sets the unused bits of the last byte to
 /// zero. Bytes beyond the last word do not change.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn send(bytes: &mut [u8], words: &[u16], quantity: u8) {
     for (pair, word) in bytes.chunks_mut(2).zip(words) {
         for (byte, half) in pair.iter_mut().zip(word.to_le_bytes()) {
@@ -17,6 +19,8 @@ pub fn send(bytes: &mut [u8], words: &[u16], quantity: u8) {
 }
 
 /// Fills `words` from data bytes, and sets the unused bits of the last word to zero.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn take(words: &mut [u16], bytes: &[u8], quantity: u8) {
     for (word, pair) in words.iter_mut().zip(bytes.chunks(2)) {
         *word = pair

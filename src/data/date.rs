@@ -58,7 +58,7 @@ const fn days_of(year: u16, month: u8) -> u8 {
 
 impl Date {
     /// True if it is a time of day without a date.
-    pub const fn is_time_only(&self) -> bool {
+    pub(crate) const fn is_time_only(&self) -> bool {
         self.year == 0 && self.month == 0 && self.day == 0
     }
 

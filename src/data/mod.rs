@@ -1,12 +1,13 @@
 //! Conversion between words and bits in the caller's memory and data bytes on the wire.
 
+// For the crate mbm-c; it may change in any version.
 #[doc(hidden)]
 pub mod arithmetic;
 pub mod bits;
 pub mod clock;
 pub mod date;
-pub mod digits;
-pub mod half;
+pub(crate) mod digits;
+pub(crate) mod half;
 pub mod order;
 pub mod raw;
 pub mod text;

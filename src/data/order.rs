@@ -57,12 +57,16 @@ impl Order {
     /// The mask that converts byte positions of a value of `size` bytes (2, 4 or 8). The
     /// byte at position `n` of the value, counted from the most significant byte, is byte
     /// `n ^ mask` on the wire.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn mask(self, size: usize) -> usize {
         self as usize & size.wrapping_sub(1)
     }
 
     /// Where register `nth` of a value of `count` registers (1 to 4) is among them. Register 0 is the
     /// most significant. `None` if the order does not say it: one by halves, for three registers.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn place(self, nth: u16, count: u16) -> Option<u16> {
         let words = self as u16 >> 1;
         if count == 3 {

@@ -52,7 +52,7 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// As [`Registers::raw`]; [`Error::OutOfRange`] for a number with more bits. Nothing is set
     /// then.
-    pub fn set_raw(
+    pub(crate) fn set_raw(
         &mut self,
         order: Order,
         address: u16,

@@ -146,6 +146,8 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is copied then.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn load(&self, address: u16, mask: usize, bytes: &mut [u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter_mut().enumerate() {
@@ -281,6 +283,8 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is set then.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn store(&mut self, address: u16, mask: usize, bytes: &[u8]) -> Result<(), Error> {
         let start = self.byte_index(address, bytes.len())?;
         for (place, byte) in bytes.iter().enumerate() {
@@ -401,6 +405,8 @@ fn byte_of_bit(bit: u8) -> Result<(bool, u8), Error> {
 }
 
 /// Writes `words` as data bytes. Bytes beyond the last word do not change.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn send_words(bytes: &mut [u8], words: &[u16]) {
     for (pair, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
         *pair = word.to_be_bytes();
@@ -408,6 +414,8 @@ pub fn send_words(bytes: &mut [u8], words: &[u16]) {
 }
 
 /// Fills `words` from data bytes.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn take_words(words: &mut [u16], bytes: &[u8]) {
     for (word, pair) in words.iter_mut().zip(bytes.as_chunks().0) {
         *word = u16::from_be_bytes(*pair);

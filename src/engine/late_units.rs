@@ -103,6 +103,7 @@ impl LateUnits {
     /// Makes the engine hold the next reply after a cancelled request, as after a timeout. It
     /// is for model checkers: they find that the master then never gets a reply of the device
     /// again.
+    // For model checkers.
     #[doc(hidden)]
     pub fn forget_cancelled(&mut self) {
         for record in &mut self.records {

@@ -120,6 +120,7 @@ pub struct Engine<P, S: Storage, Q> {
     /// How many bytes have arrived that were not counted yet.
     received: u16,
     /// The units that owe replies.
+    // For model checkers.
     #[doc(hidden)]
     pub late_units: LateUnits,
     /// The byte stream.

@@ -49,6 +49,7 @@ impl<P, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
 
     /// Makes `now` the zero of the clock. Times before `now - longest` become `now - longest`.
     /// For model checkers: two engines that will behave alike become equal.
+    // For model checkers.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
         for time in [&mut self.since, &mut self.begun, &mut self.now] {

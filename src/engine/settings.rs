@@ -112,6 +112,8 @@ impl Settings {
     }
 
     /// Time of one character, also if the baud rate is unknown.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn any_character(&self) -> u16 {
         if self.character == 0 {
             time::DEFAULT_CHARACTER

@@ -51,12 +51,18 @@ pub trait Count:
     const ZERO: Self;
 
     /// This number of bytes of a frame buffer.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn of(bytes: usize) -> Self;
 
     /// The next number; the greatest one stays.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn next(self) -> Self;
 
     /// The number in 16 bits.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn to_u16(self) -> u16;
 }
 
@@ -117,26 +123,40 @@ pub trait Storage {
     type Count: Count;
 
     /// Bytes of the frame buffer.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn capacity(&self) -> Self::Count;
 
     /// A byte of the frame buffer.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn byte(&self, index: Self::Count) -> u8;
 
     /// Sets a byte of the frame buffer.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn set_byte(&mut self, index: Self::Count, byte: u8);
 
     /// `count` bytes of the frame buffer from `index` on, to read.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn slice(&self, index: Self::Count, count: Self::Count) -> &[u8];
 
     /// `count` bytes of the frame buffer from `index` on, to read and write.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn bytes(&mut self, index: Self::Count, count: Self::Count) -> &mut [u8];
 
     /// Moves `count` bytes of the frame buffer from `from` on to its front.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn move_down(&mut self, from: Self::Count, count: Self::Count) {
         move_to_front(self.bytes(Self::Count::ZERO, from + count), from.into());
     }
 
     /// Adds `more` to a counter, if there is memory for counters.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn count(&mut self, _counter: Counter, _more: u32) {}
 }
 
@@ -144,6 +164,8 @@ pub trait Storage {
 /// uses at most [`Words::transmit_words`] and [`Words::response_words`] words.
 pub trait Words: Storage<Count = u8> {
     /// The response timeout in microseconds. `settings` has that of the line.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn response_timeout(&self, settings: &Settings) -> u32 {
         settings.response_timeout.get()
     }
@@ -152,21 +174,29 @@ pub trait Words: Storage<Count = u8> {
     fn transmit(&mut self) -> &mut [u16];
 
     /// How many transmit words there are.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn transmit_words(&self) -> u8;
 
     /// Copies `count` bytes of the transmit words into the frame buffer from `to` on: the high
     /// byte of each word first if `high_first`, otherwise the low byte.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn load_words(&mut self, to: u8, count: u8, high_first: bool);
 
     /// The response words, at most 255: a successful read fills them.
     fn response(&self) -> &[u16];
 
     /// How many response words there are.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn response_words(&self) -> u8;
 
     /// Fills the response words with `count` bytes of the frame buffer from `from` on: the high
     /// byte of each word first if `high_first`, otherwise the low byte. If `count` is odd, the
     /// missing byte of the last word is 0.
+    // The core calls it; it may change in any version.
+    #[doc(hidden)]
     fn store_words(&mut self, from: u8, count: u8, high_first: bool);
 }
 

@@ -45,6 +45,7 @@ macro_rules! statuses {
             }
 
             /// As [`Status::text`], for C.
+            // For the C API; it may change in any version.
             #[doc(hidden)]
             pub const fn c_text(self) -> &'static CStr {
                 match self.0 {
@@ -321,12 +322,14 @@ impl Status {
     }
 
     /// The number of this status, as C sees it.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     pub const fn code(self) -> u8 {
         self.0
     }
 
     /// The status with the number `code`.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     pub const fn from_code(code: u8) -> Status {
         Status(code)
@@ -431,12 +434,14 @@ impl Error {
     }
 
     /// The status that this error is.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     pub const fn status(self) -> Status {
         Status(self as u8)
     }
 
     /// The number of this error, as C sees it.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     pub const fn code(self) -> u8 {
         self as u8

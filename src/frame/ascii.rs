@@ -26,6 +26,8 @@ const MIN_DIGITS: usize = 2 * 3;
 const MAX_DIGITS: usize = MAX_FRAME - DELIMITERS;
 
 /// The value of a hexadecimal digit in upper or lower case; `None` for other characters.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn digit(character: u8) -> Option<u8> {
     match character {
         b'0'..=b'9' => Some(character - b'0'),
@@ -36,6 +38,8 @@ pub const fn digit(character: u8) -> Option<u8> {
 }
 
 /// The hexadecimal digit, in upper case, for a value of 0 to 15.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn character(digit: u8) -> u8 {
     if digit < 10 {
         b'0' + digit
@@ -45,6 +49,8 @@ pub const fn character(digit: u8) -> u8 {
 }
 
 /// The byte that two hexadecimal digits encode; `None` if `pair` is not two digits.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn byte(pair: &[u8]) -> Option<u8> {
     match pair {
         [high, low] => match (digit(*high), digit(*low)) {
@@ -56,6 +62,8 @@ pub const fn byte(pair: &[u8]) -> Option<u8> {
 }
 
 /// The meaning of a character in a frame.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CharacterKind {
     /// A colon. It always begins a frame: an unfinished frame before it was cut off.
@@ -68,6 +76,8 @@ pub enum CharacterKind {
 
 /// The meaning of `character`, which follows the character `before`. `end` is the end
 /// character of frames.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn kind_of(before: u8, character: u8, end: u8) -> CharacterKind {
     if character == end && before == CARRIAGE_RETURN {
         CharacterKind::End
@@ -81,6 +91,8 @@ pub const fn kind_of(before: u8, character: u8, end: u8) -> CharacterKind {
 /// Finds the first frame in `characters`. Returns the index of its colon, and the index after
 /// its end character `end` if that has arrived. If there are several colons before the end
 /// character, the last one begins the frame: the frames before it were cut off.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
     let mut begin = None;
     let mut before = 0;
@@ -96,6 +108,8 @@ pub fn find(characters: &[u8], end: u8) -> (usize, Option<usize>) {
 }
 
 /// The result of decoding a frame.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Decoded {
     /// The frame is valid. The number is the length of unit and PDU, in bytes.
@@ -109,6 +123,8 @@ pub enum Decoded {
 /// Decodes the frame that fills `bytes`. Digits may be in upper or lower case. If `in_place` is
 /// true, unit, PDU and LRC are written to the front of `bytes`; a malformed frame may then be
 /// partly overwritten. If it is false, `bytes` does not change.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
     let length = match bytes {
         [START, characters @ .., CARRIAGE_RETURN, last] if *last == end => characters.len(),
@@ -188,6 +204,8 @@ pub fn emit(
 ///
 /// # Errors
 /// [`Error::BufferTooSmall`]; `buffer` is then unchanged.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Error> {
     let total = 2 * (content + 1) + DELIMITERS;
     let Some(frame) = buffer.get_mut(..total) else {

@@ -73,6 +73,8 @@ impl Crc16 {
 
     /// The inverse of [`Crc16::with`]: the CRC before `byte`, from the CRC after `byte`. (A bit that is
     /// shifted counts the steps of this loop: 52 bytes of flash less on an AVR than a number.)
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[must_use]
     pub fn before(self, byte: u8) -> Crc16 {
         let mut crc = self.0;
@@ -96,6 +98,8 @@ impl Crc16 {
     }
 
     /// True for the CRC of a whole frame including its CRC, if the frame's CRC is right.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn is_residue(self) -> bool {
         self.0 == 0
     }

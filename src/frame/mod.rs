@@ -25,6 +25,8 @@ pub enum Framing {
 
 impl Framing {
     /// The framing for a number from the C API.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn from_code(code: u8) -> Option<Framing> {
         match code {
             0 => Some(Framing::Rtu),

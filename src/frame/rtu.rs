@@ -32,6 +32,8 @@ pub const PDU: usize = 1;
 
 /// Writes a frame to `buffer`. The callback `pdu` writes the PDU of `length` bytes. Returns
 /// false, and writes nothing, if the frame does not fit into `buffer`.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn write(buffer: &mut [u8], unit: u8, length: usize, pdu: impl FnOnce(&mut [u8])) -> bool {
     let Some(frame) = buffer.get_mut(..length + OVERHEAD) else {
         return false;
@@ -97,6 +99,8 @@ pub fn is_frame(bytes: &[u8]) -> bool {
 
 /// Length of the shortest frame at the start of `bytes` whose CRC is right. Tries lengths from
 /// `least` on in steps of `step`. `None` if there is no such frame.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn find_first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
     let mut total = least;
     let mut crc = Crc16::START.with(bytes.get(..total)?);
@@ -114,6 +118,8 @@ pub fn find_first(bytes: &[u8], least: usize, step: usize) -> Option<usize> {
 /// there is none. There is at least one byte. Goes back from the end, and undoes the CRC byte by
 /// byte: a frame begins where the CRC has its initial value. As for [`is_frame`], a frame may lack a
 /// PDU.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub fn find_last(bytes: &[u8]) -> usize {
     // Most often all bytes are one frame. An AVR sees that forwards in a third of the time, for
     // 42 bytes of flash, and a host by its tables.

@@ -49,12 +49,14 @@ pub fn header(bytes: &[u8]) -> Result<Header, Error> {
 }
 
 /// The length field for a PDU of `pdu` bytes.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn length(pdu: usize) -> [u8; 2] {
     (pdu as u16 + 1).to_be_bytes()
 }
 
 /// How many bytes of a header are needed to check its next field, if `have` bytes are there.
-pub const fn next_part(have: usize) -> usize {
+pub(crate) const fn next_part(have: usize) -> usize {
     match have {
         0..4 => 4,
         4..HEADER => HEADER,
@@ -129,7 +131,7 @@ pub fn emit(
 }
 
 /// The header before a PDU of `pdu` bytes.
-pub const fn emit_header(transaction: u16, pdu: usize, unit: u8) -> [u8; PDU] {
+pub(crate) const fn emit_header(transaction: u16, pdu: usize, unit: u8) -> [u8; PDU] {
     let [a, b] = transaction.to_be_bytes();
     let [c, d] = length(pdu);
     [a, b, 0, 0, c, d, unit]

@@ -7,8 +7,10 @@
 mod asynchronous;
 mod calls;
 mod lenient;
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub mod node;
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub mod request;
 
@@ -64,12 +66,14 @@ impl<P, S: Words> Master<P, S> {
     }
 
     /// See [`crate::engine::Engine::rebase`].
+    // For model checkers.
     #[doc(hidden)]
     pub fn rebase(&mut self, now: u32, longest: u32) {
         self.line.rebase(now, longest);
     }
 
     /// The line of the master. For model checkers.
+    // For model checkers.
     #[doc(hidden)]
     pub fn line(&mut self) -> &mut Line<P, S> {
         &mut self.line

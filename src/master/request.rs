@@ -27,6 +27,8 @@ impl FunctionSpec {
     /// The part that a [`MasterRequest`] needs, in one byte: the function code and three flags.
     /// The compiler converts each constant, which takes less flash than at run time. It must be
     /// one of the master's functions.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn short(self) -> u8 {
         let mut short = self.function();
         if self.has(RANGE) {

@@ -207,6 +207,8 @@ pub fn range(head: &[u8]) -> (Option<u16>, Option<u16>) {
 pub const COIL_ON: u16 = 0xFF00;
 
 /// The value in a request of 05 that switches a coil on or off.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub const fn coil_value(on: bool) -> u16 {
     if on {
         COIL_ON
@@ -268,7 +270,7 @@ pub(crate) const DATA: u32 = 28;
 
 impl FunctionSpec {
     /// As [`FunctionSpec::of`], also for 16 and 17 (hex), which have more words.
-    pub const fn of_head(function: u8) -> FunctionSpec {
+    pub(crate) const fn of_head(function: u8) -> FunctionSpec {
         match function {
             MASK_WRITE_REGISTER => FunctionSpec::MASK_WRITE_REGISTER,
             READ_WRITE_MULTIPLE_REGISTERS => FunctionSpec::READ_WRITE_REGISTERS,
@@ -310,6 +312,8 @@ impl FunctionSpec {
     }
 
     /// 01 to 04: the functions that read a table.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn reads_table(function: u8) -> FunctionSpec {
         let FunctionSpec(spec) = if function <= 2 {
             FunctionSpec::bits(0)
@@ -349,6 +353,8 @@ impl FunctionSpec {
 
     /// How many bytes of the request the response repeats; 0 for none, and for a response that
     /// repeats all.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn repeated(self) -> u8 {
         self.number(REPEATED)
     }

@@ -2,10 +2,12 @@
 //! protocol V1.1b3, clause 6).
 //!
 //! [`functions`] is the table of the functions. [`request`] and [`response`] take PDUs apart
-//! and write them, from [`fields`]. Master and client make their requests from the same table.
+//! and write them. Master and client make their requests from the same table.
 
 pub mod custom;
 pub mod diagnostics;
+// For the packets of the C API; it may change in any version.
+#[doc(hidden)]
 pub mod fields;
 pub mod files;
 pub mod functions;

@@ -127,6 +127,8 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// The exception that a server answers to records of a file that are not valid.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn take(function: u8, source: &mut impl Fields<'a>) -> Result<Self, Error> {
         let mut request = Request::of(function);
         request.pass(source);
@@ -135,6 +137,8 @@ impl<'a> Request<'a> {
     }
 
     /// Gives all fields to `sink`, in the order of the wire.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn give(&self, sink: &mut impl Fields<'a>) {
         // A sink changes no field.
         Request::pass(&mut { *self }, sink);

@@ -142,6 +142,8 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// [`Error::MalformedReply`] for records of a file or objects that are not valid.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn take(function: u8, source: &mut impl Fields<'a>) -> Result<Self, Error> {
         let mut response = match Response::of(function) {
             Response::Exception { .. } => return Err(Error::InvalidFunction),
@@ -153,6 +155,8 @@ impl<'a> Response<'a> {
     }
 
     /// Gives all fields to `sink`, in the order of the wire.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn give(&self, sink: &mut impl Fields<'a>) {
         // A sink changes no field.

@@ -116,7 +116,7 @@ impl Field {
     }
 
     /// True if it is bits of a register.
-    pub const fn is_part_of_register(&self) -> bool {
+    pub(crate) const fn is_part_of_register(&self) -> bool {
         self.value_type == BIT && !self.is_in_bits()
     }
 
@@ -181,12 +181,12 @@ impl Field {
     }
 
     /// True if the values are integers.
-    pub const fn is_integer(&self) -> bool {
+    pub(crate) const fn is_integer(&self) -> bool {
         self.value_type.wrapping_sub(UINT16) <= INT64 - UINT16
     }
 
     /// True if the values are integers with a sign.
-    pub const fn is_signed(&self) -> bool {
+    pub(crate) const fn is_signed(&self) -> bool {
         self.is_integer() && self.value_type % 2 == INT16 % 2
     }
 }

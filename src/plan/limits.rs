@@ -56,6 +56,8 @@ pub trait ReadLimits {
 
     /// As [`Field::check`]; [`Status::ILLEGAL_DATA_ADDRESS`] also if the field goes into an excluded
     /// range; [`Status::ILLEGAL_DATA_VALUE`] if one read cannot hold it.
+    // The plan calls it.
+    #[doc(hidden)]
     fn check(&self, field: &Field, has_unit_0: u8) -> Status {
         let status = field.check(has_unit_0);
         if status != Status::OK {
@@ -70,6 +72,8 @@ pub trait ReadLimits {
     }
 
     /// The most bits or registers of one read from the table of a field.
+    // The plan calls it.
+    #[doc(hidden)]
     fn longest_read(&self, field: &Field) -> u32 {
         let own = self.units().iter().find(|limits| limits.unit == field.unit);
         let (all, own) = if field.is_in_bits() {
@@ -82,6 +86,8 @@ pub trait ReadLimits {
     }
 
     /// The widest gap that a read from the table of a field may cover.
+    // The plan calls it.
+    #[doc(hidden)]
     fn widest_gap(&self, field: &Field) -> u32 {
         if field.is_in_bits() {
             self.bit_gap().into()
@@ -92,6 +98,8 @@ pub trait ReadLimits {
 
     /// True if one of the places (see `Field::place`) from `first` up to, but not including,
     /// `end` is excluded.
+    // The plan calls it.
+    #[doc(hidden)]
     fn excludes(&self, first: u32, end: u32) -> bool {
         self.excluded().iter().any(|range| {
             let unit = match range.unit {

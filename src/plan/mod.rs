@@ -8,6 +8,7 @@
 //! wrap.
 
 pub mod conversion;
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub mod divide;
 pub mod field;

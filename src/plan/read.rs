@@ -44,7 +44,7 @@ impl Position {
     }
 
     /// The index of the field at the position `place`, if it is in the read with this index.
-    pub fn field_of(positions: &[Position], read: usize, place: usize) -> Option<usize> {
+    pub(crate) fn field_of(positions: &[Position], read: usize, place: usize) -> Option<usize> {
         let field = positions.get(place)?.field();
         (positions.get(field)?.read() == read).then_some(field)
     }

@@ -45,6 +45,7 @@ pub trait Port {
 
     /// As [`Port::read`], in the form of a hook in C: negative if the link is lost. All parts call
     /// this one, so that a port in C needs no code between them and its hook.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     fn read_count(&mut self, bytes: &mut [u8]) -> i16 {
         let most = bytes.len().min(MOST);
@@ -53,6 +54,7 @@ pub trait Port {
     }
 
     /// As [`Port::read_count`], for [`Port::write`].
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     fn write_count(&mut self, bytes: &[u8]) -> i16 {
         let most = bytes.len().min(MOST);
@@ -99,6 +101,7 @@ fn count(result: Result<usize, Error>, most: usize) -> i16 {
 }
 
 /// The result of [`Port::read`] if [`Port::read_count`] returns `count`.
+// For the C API; it may change in any version.
 #[doc(hidden)]
 pub fn result(count: i16) -> Result<usize, Error> {
     count.try_into().map_err(|_| Error::LinkLost)

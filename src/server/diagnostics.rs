@@ -43,6 +43,8 @@ pub struct Diagnostics {
 }
 
 /// Whether a request restarts the communications of the line (sub-function 01).
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Restart {
     /// The request is no restart.
@@ -102,6 +104,8 @@ impl Diagnostics {
 
     /// Counts a frame before it is served. False if the unit must not serve it: a damaged
     /// frame, a frame for another unit, and in listen only mode any request but a restart.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn count_frame(&mut self, info: &Indication, addressing: Addressing, pdu: &[u8]) -> bool {
         if info.again {
             return true;
@@ -146,6 +150,8 @@ impl Diagnostics {
     }
 
     /// Counts the result of a request for which `count_frame` returned true.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn count_outcome(&mut self, addressing: Addressing, function: u8, reply: Reply) {
         let code = reply.exception_code();
         if self.cleared != 0 {
@@ -190,6 +196,8 @@ impl Diagnostics {
 
     /// Serves functions 08, 0B and 0C. The request PDU is the first `length` bytes of `pdu`;
     /// the response overwrites it. Also returns whether the line is to be restarted.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn serve(&mut self, pdu: &mut [u8], length: usize) -> (Reply, Restart) {
         let reply = match pdu.first() {
             Some(&DIAGNOSTICS) => return self.diagnose(pdu, length),

@@ -162,6 +162,8 @@ impl<P: Port> Server<P, [u8; 260]> {
 
 impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Begins with RTU frames on a serial line, and the silence for an unknown baud rate.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn begin_rtu(&mut self) {
         self.begin_rtu_in(self.storage.capacity());
     }
@@ -180,6 +182,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Begins with RTU frames in a TCP stream. Silence does not separate frames there.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn begin_rtu_over_tcp(&mut self) {
         self.begin_rtu_over_tcp_in(self.storage.capacity());
     }
@@ -198,6 +202,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Begins with ASCII frames on a serial line.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn begin_ascii(&mut self) {
         self.begin_ascii_in(self.storage.capacity());
     }
@@ -217,6 +223,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// Begins with Modbus TCP frames.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn begin_tcp(&mut self) {
         self.begin_tcp_in(self.storage.capacity());
     }
@@ -365,6 +373,8 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// True for RTU frames on a serial line. A silence of t3.5 ends them. A buffer has less space
     /// for the PDU of an ASCII frame.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn is_rtu_line(&self) -> bool {
         let space = self.storage.capacity().wrapping_sub(rtu::OVERHEAD);
         self.request.is_serial() && self.request.space == space as u16

@@ -31,6 +31,8 @@ pub struct Indication {
 }
 
 /// How a frame addresses a unit.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Addressing(MachineByte);
@@ -44,6 +46,8 @@ impl Addressing {
     pub const BROADCAST: Addressing = Addressing(2);
 
     /// The number of this addressing in the C API.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     #[allow(clippy::unnecessary_cast)] // It is needed on an AVR.
     pub const fn code(self) -> u8 {
@@ -54,7 +58,7 @@ impl Addressing {
     /// too, any other frame is not.
     #[inline(always)]
     #[must_use]
-    pub const fn to_others(self) -> Addressing {
+    pub(crate) const fn to_others(self) -> Addressing {
         Addressing(self.0 & Addressing::BROADCAST.0)
     }
 }
@@ -76,6 +80,8 @@ impl Indication {
     };
 
     /// How the frame, with this function code, addresses the unit that its id names.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub const fn addressing(&self, function: u8) -> Addressing {
         match self.addressing_of_all(function) {
@@ -85,6 +91,8 @@ impl Indication {
     }
 
     /// As [`Indication::addressing`], but services drop a broadcast of a function that reads.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub const fn addressing_of_all(&self, function: u8) -> Addressing {
         if self.length == 0 || self.is_from_server(function) {
@@ -106,6 +114,8 @@ impl Indication {
     }
 
     /// True if the frame is a broadcast.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub const fn is_broadcast(&self) -> bool {
         self.is_serial() && self.to == 0
@@ -113,11 +123,13 @@ impl Indication {
 
     /// True on a serial line.
     #[inline]
-    pub const fn is_serial(&self) -> bool {
+    pub(crate) const fn is_serial(&self) -> bool {
         self.own == SERIAL
     }
 
     /// True if a frame that is no broadcast addresses a unit with this id.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub const fn is_for(&self, id: u16) -> bool {
         self.to as u16 == id || id == ANY as u16 || self.is_for_any()
@@ -126,7 +138,7 @@ impl Indication {
     /// True if a frame that is no broadcast addresses the server itself. In a stream the ids 0
     /// and 255 do (messaging on TCP/IP guide V1.0b, 4.4.1.2).
     #[inline]
-    pub const fn is_for_any(&self) -> bool {
+    pub(crate) const fn is_for_any(&self) -> bool {
         self.to == 0 || self.to == self.own
     }
 }
@@ -138,6 +150,8 @@ pub const STREAM: u8 = 255;
 
 /// True for functions that only write and for user-defined functions. Other functions are
 /// not carried out if they are broadcast (serial line guide V1.02, 2.1).
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[inline]
 pub const fn only_writes(function: u8) -> bool {
     function > 0x40 || matches!(functions::direction(function), Direction::Writes)

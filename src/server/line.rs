@@ -146,6 +146,8 @@ pub struct Server<P, B> {
 
 impl<P: Port, B: ServerStorage> Server<P, B> {
     /// A server that has no framing yet.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn new(port: P, storage: B) -> Self {
         Server {
             phase: ServerPhase::Listen,
@@ -249,12 +251,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// True if the server has begun with a framing.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn has_framing(&self) -> bool {
         self.receive.is_some() && self.encode_adu.is_some()
     }
 
     /// True if [`Server::poll`] needs the right time. Over TCP any time will do.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn keeps_time(&self) -> bool {
         usize::from(self.request.head) != tcp::PDU
@@ -272,6 +278,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// The first half of [`Server::poll`]: looks for a request.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     #[inline(always)]
     pub fn look(&mut self, now: u32) -> Status {
@@ -288,6 +295,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// The second half of [`Server::poll`]: sends the response, if there is one.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     #[inline(always)]
     pub fn go_on(&mut self) -> Status {
@@ -499,6 +507,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// As [`Server::answer`], for a reply other than [`Reply::NOT_HANDLED`]. With one function for
     /// both, a server takes 8 bytes more on a Cortex-M0+ and 10 on an AVR.
+    // For the C API; it may change in any version.
     #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn answer_served(&mut self, reply: Reply) -> bool {

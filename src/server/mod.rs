@@ -24,6 +24,7 @@ mod reply;
 mod serve_device;
 #[cfg(feature = "std")]
 mod shared;
+mod simulated;
 pub mod storage;
 pub mod table;
 mod tables;
@@ -32,9 +33,19 @@ mod units;
 
 pub use device::{Bits, BitsMut, Device};
 pub use framing::{respond, DELIMITER};
-pub use indication::{only_writes, Addressing, Indication, ANY};
+pub use indication::Indication;
+// For the C API; it may change in any version.
+#[doc(hidden)]
+pub use indication::{only_writes, Addressing, ANY};
 pub use line::{Server, ServerStorage};
-pub use reply::{Refusal, Reply};
+// For the C API; it may change in any version.
+#[doc(hidden)]
+pub use reply::Refusal;
+pub use reply::Reply;
+pub use simulated::SimulatedPort;
 pub use tables::{Table, Tables};
 pub use unit::Unit;
-pub use units::{dispatch, Dispatch, Service, ServiceUnit, Units};
+// For the C API; it may change in any version.
+#[doc(hidden)]
+pub use units::{dispatch, Dispatch};
+pub use units::{Service, ServiceUnit, Units};

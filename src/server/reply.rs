@@ -30,7 +30,7 @@ impl Reply {
 
     /// True for [`Reply::ABSENT`].
     #[inline(always)]
-    pub const fn is_absent(self) -> bool {
+    pub(crate) const fn is_absent(self) -> bool {
         self.0 >> 8 == Reply::ABSENT.0 >> 8
     }
 
@@ -45,11 +45,15 @@ impl Reply {
     }
 
     /// The number of this reply in the C API.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn code(self) -> usize {
         self.0
     }
 
     /// The reply for a number from the C API. An invalid number becomes exception 04.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn from_code(code: usize) -> Reply {
         match code {
             0..=253 | 0xFF | 0x0101..=0x017F | 0x0200 => Reply(code),
@@ -58,6 +62,8 @@ impl Reply {
     }
 
     /// The reply for a number that [`Reply::code`] returned.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn from_number(code: usize) -> Reply {
         Reply(code)
     }
@@ -82,6 +88,8 @@ impl Reply {
 
     /// Writes an exception response over the request at the front of `pdu`.
     /// Returns the length of the response; 0 if there is none.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn write_exception(self, pdu: &mut [u8]) -> usize {
         self.or_illegal().write_served_exception(pdu)
     }
@@ -102,6 +110,8 @@ impl Reply {
 
 /// The exception with which a unit refuses a request, as far as its services were called: 01 as
 /// long as none of them serves the function, 02 once one of them has returned [`Reply::ABSENT`].
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Refusal(u8);

@@ -14,6 +14,8 @@ use crate::pdu::{
 };
 
 /// One of the four tables, named by the function that reads it.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct TableKind(u8);
@@ -91,6 +93,8 @@ pub trait DataModel {
 
 /// The part of [`DataModel`] that functions need. The less common ones take it as a trait
 /// object, so firmware carries them once for all tables.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 pub trait TableAccess {
     /// Carries out `operation` on `quantity` cells, which are `bytes` bytes of data. The first
     /// byte of `pdu` is the function code of the request. The address of the cells follows it,
@@ -153,6 +157,8 @@ pub const WRITTEN: Reply = Reply::length(5);
 
 /// The action of a request on a table. The number is the index of the data in the PDU, for a
 /// read in the PDU of the response.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct TableOperation(MachineByte);
@@ -198,6 +204,8 @@ const _: () = assert!(MAX_READ_REGISTERS * 16 == MAX_READ_BITS);
 const _: () = assert!(MAX_WRITE_REGISTERS * 16 == MAX_WRITE_BITS);
 
 /// The action of a function on this table.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[inline(always)]
 pub const fn operation(kind: TableKind, function: u8) -> TableOperation {
     if function == kind.0 {
@@ -216,6 +224,8 @@ pub const fn operation(kind: TableKind, function: u8) -> TableOperation {
 
 /// Serves a request to a table. The request PDU is the first `length` bytes of `pdu`; the
 /// response overwrites it. [`Reply::NOT_HANDLED`] if the function is not for this table.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn serve(
     kind: TableKind,
@@ -228,6 +238,8 @@ pub fn serve(
 }
 
 /// As [`serve`], with the action of the function.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[inline(always)]
 pub fn serve_as(
     operation: TableOperation,
@@ -292,6 +304,8 @@ pub(super) fn counted(pdu: &mut [u8], bytes: usize) -> Reply {
 }
 
 /// True for functions that [`serve_mask_and_read_write`] serves.
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[inline(always)]
 pub const fn is_mask_or_read_write(function: u8) -> bool {
     matches!(
@@ -301,6 +315,8 @@ pub const fn is_mask_or_read_write(function: u8) -> bool {
 }
 
 /// Serves 16 and 17 for holding registers, as [`serve`].
+// For the C API; it may change in any version.
+#[doc(hidden)]
 #[cfg_attr(target_os = "none", inline(never))]
 pub fn serve_mask_and_read_write(
     cells: &mut (impl TableAccess + ?Sized),

@@ -63,6 +63,8 @@ pub struct Event<'a> {
 
 impl EventKind {
     /// The kind for a number from the C API.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn from_code(code: u8) -> Option<EventKind> {
         match code {
             0 => Some(EventKind::Request),

@@ -34,6 +34,8 @@ impl RequestState {
     }
 
     /// As [`RequestState::set`], with up to four words after the function code.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn set_all(&mut self, spec: FunctionSpec, words: &[usize; 4]) -> Status {
         // `map` would compile to a loop.
         let (first, second) = (words[0] as u16, words[1] as u16);
@@ -99,6 +101,8 @@ impl RequestState {
     }
 
     /// Adds the range that 17 (hex) writes, after [`RequestState::set_all`].
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn add_write(&mut self, address: u16, quantity: u16) -> Status {
         self.head_length = FOUR_WORDS;
@@ -115,6 +119,8 @@ impl RequestState {
     }
 
     /// Adds the number of words of data to 08, after [`RequestState::set`].
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn add_words(&mut self, sub_function: u16, words: u16) -> Status {
         self.data_length = (words << 1) as u8;
         self.rule = self.data_length.wrapping_add(3);
@@ -132,6 +138,8 @@ impl RequestState {
 
     /// Sets the byte count of 14 or 15 (hex) with one group of records, after
     /// [`RequestState::set_all`].
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn add_group(&mut self, file: u16, record: u16, length: u16) -> Status {
         let bytes = (length << 1) as u8;
         self.head_length = FOUR_WORDS;
@@ -201,12 +209,16 @@ impl RequestState {
     }
 
     /// The two words of 2B/0E (hex).
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn identification(code: u8, object: u8) -> [u16; 2] {
         let mei_type = MEI_READ_DEVICE_IDENTIFICATION;
         [u16::from_be_bytes([mei_type, code]), u16::from(object) << 8]
     }
 
     /// Returns [`Status::OK`] if `code` is a read device id code.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn check_code(code: u8) -> Status {
         value(matches!(code, 1..=4))
     }
@@ -232,6 +244,8 @@ impl RequestState {
 
     /// Adds the function code of a user-defined function, the `kind` of its length rule and
     /// the numbers of that rule, after [`RequestState::set`].
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(always))]
     pub fn add_rule(
         &mut self,
@@ -251,6 +265,8 @@ impl RequestState {
     }
 
     /// Sets the number of bytes of data that follow the head.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn follow(&mut self, bytes: u16) -> Status {
         self.data_length = bytes as u8;
         value(usize::from(bytes) + usize::from(self.head_length) <= MAX_PDU)

@@ -8,7 +8,7 @@ use crate::pdu::functions::{BITS, BROADCAST, FIXED, GROUPS, KIND, READ, REPEATS_
 impl RequestState {
     /// How many bytes of a deviating response `pdu` count, after its byte count was made that of the
     /// request; 0 if it does not deviate in such a way.
-    pub fn counted_length(&self, pdu: &mut [u8]) -> u8 {
+    pub(crate) fn counted_length(&self, pdu: &mut [u8]) -> u8 {
         if pdu.first() != Some(&self.function()) {
             0
         } else if self.spec.0 & (KIND | GROUPS) == READ {

@@ -32,6 +32,8 @@ impl RequestState {
     /// alone. Then it lacks the byte count before them, which is added. The first byte tells
     /// both apart, because no byte count is as small as the reference type at the beginning of
     /// a group.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn forward_groups(&mut self, function: u8, body: &[u8]) -> Status {
         let has_groups = matches!(
             function,

@@ -21,45 +21,55 @@ impl RequestState {
     }
 
     /// The function code.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn function(&self) -> u8 {
         self.head[0]
     }
 
     /// True for Return Query Data (clause 6.8.1), whose response repeats data of the caller's
     /// choice.
-    pub fn returns_query_data(&self) -> bool {
+    pub(crate) fn returns_query_data(&self) -> bool {
         self.function() == functions::DIAGNOSTICS && self.spec.has(REPEATS_DATA)
     }
 
     /// Bytes of the caller's data that are sent.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn data_length(&self) -> u8 {
         self.data_length
     }
 
     /// True if the data to send are words.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn sends_words(&self) -> bool {
         self.spec.has(SENDS_WORDS)
     }
 
     /// True if the data received are words.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn takes_words(&self) -> bool {
         self.spec.has(TAKES_WORDS)
     }
 
     /// True if the request may be broadcast: 05, 06, 0F, 10, 15 and 16, and the
     /// sub-functions 01, 04, 0A and 14 of 08 (hex).
-    pub const fn may_be_broadcast(&self) -> bool {
+    pub(crate) const fn may_be_broadcast(&self) -> bool {
         self.spec.has(BROADCAST)
     }
 
     /// False for a request without a response: 08 with sub-function 04, Force Listen Only Mode.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn is_answered(&self) -> bool {
         !self.spec.has(UNANSWERED)
     }
 
     /// True for a request that changes nothing in the device: functions 01 to 04, 07, 0B, 0C,
     /// 11, 14 and 18, and 2B with MEI type 0E (hex).
-    pub const fn only_reads(&self) -> bool {
+    pub(crate) const fn only_reads(&self) -> bool {
         let [function, mei_type, ..] = self.head;
         match functions::direction(function) {
             Direction::Reads => true,
@@ -72,11 +82,15 @@ impl RequestState {
     }
 
     /// Index of the first byte of data in the response; 0 if it has no data.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn data_at(&self) -> u8 {
         self.spec.number(DATA)
     }
 
     /// Bytes of data in the response, if the request determines them; otherwise 0.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub const fn known_data(&self) -> u8 {
         if self.data_at() > 0 && matches!(self.spec.0 & KIND, FIXED | READ) {
@@ -87,11 +101,15 @@ impl RequestState {
     }
 
     /// Length of the request PDU.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn request_length(&self) -> u8 {
         self.head_length + self.data_length
     }
 
     /// A mask of the bits that are used in the last byte of data.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn mask(&self) -> u8 {
         if !self.spec.has(BITS) {
@@ -114,6 +132,8 @@ impl RequestState {
 
     /// Writes the request PDU into `pdu`, which has [`RequestState::request_length`] bytes.
     /// `byte` returns a byte of the data.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub fn emit(&self, pdu: &mut [u8], byte: impl Fn(usize) -> u8) {
         for (index, place) in pdu.iter_mut().enumerate() {
@@ -128,6 +148,8 @@ impl RequestState {
     }
 
     /// True if `pdu`, complete or not, begins as the head of this request does.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn matches_echo(&self, pdu: &[u8]) -> bool {
         for (ours, theirs) in self.head().iter().zip(pdu) {
@@ -140,7 +162,7 @@ impl RequestState {
 
     /// Length of the PDU of a response that is no exception; 0 if the request does not determine
     /// it.
-    pub const fn fixed_length(&self) -> u8 {
+    pub(crate) const fn fixed_length(&self) -> u8 {
         match self.spec.0 & KIND {
             FIXED | READ => self.rule,
             _ => 0,
@@ -152,6 +174,8 @@ impl RequestState {
     /// begins with `pdu`. If only the end of the frame determines the length, `whole`; for 11
     /// (hex) the counted length if that is greater. More than [`MAX_PDU`] for `whole` means that
     /// the frame may go on: then no such response ends, and one of 11 ends as it counts.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub fn expected(&self, pdu: &[u8], whole: usize) -> Option<NonZeroU8> {
         let length = match pdu {
@@ -215,6 +239,8 @@ impl RequestState {
     /// The status of a response: [`Status::OK`], an exception, or [`Status::MALFORMED_REPLY`] if
     /// `pdu` is no whole response to this request. `byte` returns a byte of the data that were
     /// sent.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     #[inline]
     pub fn validate(&self, pdu: &[u8], byte: impl Fn(usize) -> u8) -> Status {
         let expected = self.expected(pdu, pdu.len());

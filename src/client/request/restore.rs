@@ -10,17 +10,23 @@ const BEFORE_DATA: usize = 5;
 
 impl RequestState {
     /// True if the response has data, which the client stores.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn has_data(&self) -> bool {
         self.data_at() > 0
     }
 
     /// True if the response repeats the data of the request, as that of function 15 does. The
     /// response to a query of 08 does too, but the client stores those data.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn repeats_data(&self) -> bool {
         self.spec.has(REPEATS_DATA) && !self.has_data()
     }
 
     /// The PDU of the exception with the code `code` that answers this request.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub const fn exception_pdu(&self, code: u8) -> [u8; 2] {
         [self.function() | EXCEPTION, code]
     }
@@ -36,6 +42,8 @@ impl RequestState {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`] if it does not fit.
+    // For the C API; it may change in any version.
+    #[doc(hidden)]
     pub fn restore_response(
         &self,
         pdu: &mut [u8],
