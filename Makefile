@@ -12,7 +12,7 @@ RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-asse
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 # The hooks of a test seldom use all that they get.
 TEST_WARNINGS := $(WARNINGS) -Wno-unused-parameter
-INCLUDES := -Iinclude -Iports/linux -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
+INCLUDES := -Iinclude -Iports/linux -Iports/test -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
 MODBUS = $(shell pkg-config --cflags libmodbus)
@@ -26,6 +26,9 @@ SUPPORT := $(filter-out $(TLS),$(wildcard c-tests/support/*.c) $(wildcard ports/
 TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
          $(patsubst c-tests/%.cpp,%,$(wildcard c-tests/test_*.cpp))
 TLS_TESTS := $(filter test_tls%,$(TESTS))
+# The test kit for ports, and its own tests.
+PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
+PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
@@ -280,6 +283,7 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
+$(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)

@@ -1,0 +1,291 @@
+/* The test of a port: its clock, an empty read, idle, a second start, an error on the line.
+ * Licence: MIT OR Apache-2.0. */
+#include "mbm_porttest_parts.h"
+
+/* A clock that does not change while it is read so many times stands still: even a tick of 10 ms
+ * is over by then on a fast processor. */
+#define MOST_READS 4000000u
+
+/* --- the clock */
+
+/* Returns whether the clock moves, and notes its shortest step. */
+static uint8_t is_moving(mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    uint32_t before = port->micros(port->context), now, reads = 0;
+    uint8_t steps = 0;
+
+    test->stepUs = UINT32_MAX;
+    while (steps < 8) {
+        now = port->micros(port->context);
+        if (now != before) {
+            if (now - before < test->stepUs)
+                test->stepUs = now - before;
+            steps++;
+            before = now;
+            reads = 0;
+        } else if (++reads == MOST_READS) {
+            return 0;
+        }
+        /* Where the clock is that of a task, it moves only if others run. */
+        mbm_portTest_yield(test);
+    }
+    return 1;
+}
+
+/* Watches it for a time of the reference, or of the clock itself. Returns how far it went. */
+static uint32_t watch(mbm_portTest *test, uint32_t us, uint32_t *back)
+{
+    const mbm_port *port = test->port;
+    const uint32_t first = port->micros(port->context);
+    uint32_t before = first, now, time = mbm_portTest_now(test), later, passed = 0;
+
+    do {
+        now = port->micros(port->context);
+        /* A step forth of more than half of 2^32 is one back. */
+        if (before - now < UINT32_MAX / 2 && before - now > *back)
+            *back = before - now;
+        before = now;
+        mbm_portTest_yield(test);
+        /* In steps, since the clock may jump. */
+        later = mbm_portTest_now(test);
+        if (later - time < UINT32_MAX / 2)
+            passed += later - time;
+        time = later;
+    } while (passed < us);
+    return now - first;
+}
+
+static void compare_rates(mbm_portTest *test, uint32_t went, uint32_t us)
+{
+    /* Both may be a step late; clocks without a crystal are some percent wrong. */
+    const uint32_t may = us / 10 + 2 * test->stepUs;
+
+    if (went + may < us || went > us + may)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`micros` counted % while % us passed: return microseconds (a tick times its length in us, "
+            "a cycle counter divided by its cycles in a us).",
+            went, us);
+}
+
+void mbm_portTest_checkClock(mbm_portTest *test, uint32_t millis)
+{
+    uint32_t back = 0, went;
+
+    test->checks++;
+    if (!is_moving(test)) {
+        test->isOver = 1;
+        SAY(test, MBM_PORT_WRONG,
+            "`micros` always returns the same time: start the timer, and let its interrupt run.");
+        return;
+    }
+    SAY_NUMBERS(test, MBM_PORT_FACT, "`micros` moves in steps of % us.", test->stepUs);
+    went = watch(test, millis * 1000, &back);
+    if (back > 65000)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`micros` jumped back by % us: it must count up to 2^32 and wrap only there. Do not divide a "
+            "counter that wraps; add up its differences.",
+            back);
+    else if (back > 0)
+        SAY_NUMBERS(
+            test, MBM_PORT_ADVICE,
+            "`micros` stepped back by % us, which mbm stands up to 65 ms: a tick was read beside its "
+            "interrupt. Read the tick again after the counter, and take both anew if it has changed.",
+            back);
+    else if (test->reference != NULL)
+        compare_rates(test, went, millis * 1000);
+}
+
+/* --- a read without bytes */
+
+void mbm_portTest_checkRead(mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    uint32_t shortest = UINT32_MAX;
+    uint8_t byte, i;
+
+    test->checks++;
+    if (!mbm_portTest_drain(test, port))
+        return;
+    for (i = 0; i < 8; i++) {
+        const uint32_t began = mbm_portTest_now(test);
+        uint32_t took;
+
+        (void)port->read(port->context, &byte, 1);
+        took = mbm_portTest_since(test, began);
+        shortest = took < shortest ? took : shortest;
+    }
+    if (shortest > NO_WAIT + test->stepUs)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`read` waited for % us although nothing had come: return 0 at once (a timeout of 0, a "
+            "socket that is non-blocking).",
+            shortest);
+}
+
+/* --- idle */
+
+/* Milliseconds: a response timeout in which each sleep is short, and one in which a sleep is long.
+ */
+enum { SHORT = 4, LONG = 400 };
+
+/* The most by which a sleep may be longer than it should, in microseconds, and the longest time
+ * that a byte may lie while `idle` sleeps. */
+enum { OVERSLEEP = 3000, LIES = 100000 };
+
+/* Lets the node wait for the reply to a request that no device answers. */
+static uint8_t is_waiting(mbm_portTest *test)
+{
+    if (mbm_node_poll(&test->node) == MBM_PENDING)
+        return 1;
+    return mbm_node_readHoldingRegisters(&test->node, 0, 1) == MBM_PENDING;
+}
+
+/* Returns by how much sleeps were longer than pollDelay allows; 0 if at most two of eight were, as
+ * on a computer that has other work. A byte may end one early. */
+static uint32_t oversleep(mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    const uint32_t began = mbm_portTest_now(test);
+    uint32_t least = UINT32_MAX;
+    uint8_t sleeps = 0, longer = 0;
+
+    mbm_node_setResponseTimeout(&test->node, SHORT);
+    while (sleeps < 8 && mbm_portTest_since(test, began) < 3000000u && is_waiting(test)) {
+        const uint32_t may = mbm_node_pollDelay(&test->node);
+
+        mbm_portTest_yield(test);
+        if (may > 0 && may <= SHORT * 1000u) {
+            const uint32_t before = mbm_portTest_now(test);
+            uint32_t took;
+
+            port->idle(port->context, &test->node);
+            took = mbm_portTest_since(test, before);
+            sleeps++;
+            if (took <= may + OVERSLEEP + test->stepUs)
+                continue;
+            longer++;
+            least = took - may < least ? took - may : least;
+        }
+    }
+    return longer >= 3 ? least : 0;
+}
+
+/* Sends a byte while `idle` may sleep for long, and returns how long the byte lay there. */
+static uint32_t time_of_a_byte(mbm_portTest *test)
+{
+    const mbm_port *port = test->port, *from = test->other != NULL ? test->other : port;
+    uint32_t began = mbm_portTest_now(test);
+    uint8_t byte = 0x55;
+
+    mbm_node_setResponseTimeout(&test->node, LONG);
+    /* The request with the short timeout ends first. */
+    while (mbm_portTest_since(test, began) < 2000000u && is_waiting(test) &&
+           mbm_node_pollDelay(&test->node) < LONG * 700u)
+        mbm_portTest_yield(test);
+    if (!mbm_portTest_drain(test, port))
+        return 0;
+    began = mbm_portTest_now(test);
+    while (from->write(from->context, &byte, 1) == 0 && mbm_portTest_since(test, began) < 1000000u)
+        mbm_portTest_yield(test);
+    began = mbm_portTest_now(test);
+    do
+        port->idle(port->context, &test->node);
+    while (port->read(port->context, &byte, 1) <= 0 && mbm_portTest_since(test, began) < 1000000u);
+    return mbm_portTest_since(test, began);
+}
+
+void mbm_portTest_checkIdle(mbm_portTest *test)
+{
+    uint32_t us;
+
+    if (test->port->idle == NULL) {
+        SAY(test, MBM_PORT_FACT,
+            "The port has no `idle`: blocking calls poll without a pause. That is right where nothing else has to run.");
+        return;
+    }
+    test->checks++;
+    /* A request is short, and the frame buffer holds it and no more. */
+    mbm_line_beginRtu(&test->line, test->port, test->frame, 64);
+    mbm_line_setGap(&test->line, SHORT * 1000u);
+    mbm_line_setQuietTime(&test->line, 0);
+    mbm_node_begin(&test->node, &test->line, 247, test->words, 2, test->words, 2);
+    mbm_node_setBlocking(&test->node, 0);
+    us = oversleep(test);
+    if (us > 0)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`idle` slept at least % us longer than mbm_node_pollDelay allowed: round ticks down, and do "
+            "not sleep for less than one.",
+            us);
+    if (mbm_portTest_has_wire(test)) {
+        us = time_of_a_byte(test);
+        if (us > LIES + mbm_portTest_characters(test, 2))
+            SAY_NUMBERS(
+                test, MBM_PORT_WRONG,
+                "`idle` slept for % us while a byte lay there: let the receive interrupt end the sleep, or "
+                "sleep for one tick at most.",
+                us);
+    }
+    mbm_node_cancel(&test->node);
+}
+
+/* --- a second start, and an error on the line */
+
+void mbm_portTest_checkBegin(mbm_portTest *test)
+{
+    if (!mbm_portTest_has_wire(test))
+        return;
+    if (test->begin == NULL) {
+        SAY(test, MBM_PORT_LEFT_OUT, "The port was not begun a second time: set `begin`.");
+        return;
+    }
+    test->checks++;
+    if (test->begin(test->context) != 0) {
+        SAY(test, MBM_PORT_WRONG,
+            "`begin` failed the second time: stop the UART, its DMA and its interrupts before you start them, "
+            "for a program that changes the rate.");
+        return;
+    }
+    if (mbm_portTest_is_alive(test) || test->isOver)
+        return;
+    test->isOver = 1;
+    SAY(test, MBM_PORT_WRONG,
+        "After a second `begin` bytes do not arrive as they were sent: empty the ring, clear pending flags, and "
+        "start reception again.");
+}
+
+void mbm_portTest_checkDisturbed(mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    uint8_t byte, i;
+    uint32_t began;
+
+    if (!mbm_portTest_has_wire(test))
+        return;
+    if (test->disturb == NULL) {
+        SAY(test, MBM_PORT_LEFT_OUT,
+            "No error on the line was tried: set `disturb` to a function that makes one, such as a break.");
+        return;
+    }
+    test->checks++;
+    test->disturb(test->context);
+    began = mbm_portTest_now(test);
+    for (i = 0; i < 255 && mbm_portTest_since(test, began) < 50000; i++) {
+        if (port->read(port->context, &byte, 1) < 0) {
+            SAY(test, MBM_PORT_WRONG,
+                "`read` was negative after an error on the line: that means that the link is lost. Clear the error and "
+                "return the bytes that have come, or 0.");
+            return;
+        }
+        mbm_portTest_yield(test);
+    }
+    if (mbm_portTest_is_alive(test) || test->isOver)
+        return;
+    test->isOver = 1;
+    SAY(test, MBM_PORT_WRONG,
+        "After an error on the line bytes do not arrive as they were sent: clear the flags of framing, noise, "
+        "parity and overrun, and start reception again in the error callback.");
+}
