@@ -95,7 +95,7 @@
 //! # A port
 //!
 //! A [`port::Port`] is the way to a UART or socket, and has a clock in microseconds, which may wrap.
-//! `port::StdIo` and `port::EmbeddedIo` are ports. For other hardware, implement the trait:
+//! `port::StdIo`, `port::EmbeddedIo` and `port::PolledIo` are ports. For other hardware, implement the trait:
 //!
 //! ```
 //! use mbm::port::Port;
@@ -219,7 +219,7 @@
 //! | feature | what it adds |
 //! |---|---|
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
-//! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async |
+//! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async; `port::PolledIo`, a port over embedded-io-async |
 //! | `std` | `port::StdIo`, a port over a socket or serial port of the standard library |
 //! | `defmt` | `defmt::Format` for [`Status`], [`Error`] and [`Exception`] |
 

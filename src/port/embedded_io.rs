@@ -1,8 +1,8 @@
 //! A port over the traits of the crate embedded-io, for UARTs and sockets of a HAL.
 
+use super::transmission::Transmission;
 use super::Port;
 use crate::error::Error;
-use crate::time::{character, elapsed, Micros, Micros16};
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 
 /// A [`Port`] over a device that implements [`Read`], [`ReadReady`], [`Write`] and
@@ -18,11 +18,8 @@ pub struct EmbeddedIo<D, C, E = fn(bool)> {
     driver: E,
     /// A read that fails has lost characters, and not the link.
     is_serial: bool,
-    /// The time of a character, with an RS-485 driver; 0 without one.
-    character: Micros16,
-    /// The accepted bytes have left `wait` microseconds after `since`.
-    since: Micros,
-    wait: Micros,
+    /// Of a baud rate that is known with an RS-485 driver only.
+    transmission: Transmission,
 }
 
 impl<D, C> EmbeddedIo<D, C> {
@@ -35,9 +32,7 @@ impl<D, C> EmbeddedIo<D, C> {
             clock,
             driver: |_| {},
             is_serial: true,
-            character: 0,
-            since: 0,
-            wait: 0,
+            transmission: Transmission::UNKNOWN,
         }
     }
 
@@ -49,9 +44,7 @@ impl<D, C> EmbeddedIo<D, C> {
             clock,
             driver: |_| {},
             is_serial: false,
-            character: 0,
-            since: 0,
-            wait: 0,
+            transmission: Transmission::UNKNOWN,
         }
     }
 
@@ -64,23 +57,8 @@ impl<D, C> EmbeddedIo<D, C> {
             clock: self.clock,
             driver,
             is_serial: self.is_serial,
-            character: character(baud),
-            since: self.since,
-            wait: self.wait,
+            transmission: Transmission::new(baud),
         }
-    }
-}
-
-impl<D, C: FnMut() -> u32, E> EmbeddedIo<D, C, E> {
-    /// Notes that the device has accepted bytes.
-    fn note_sent(&mut self, bytes: usize) {
-        let (now, character) = ((self.clock)(), u32::from(self.character));
-        if elapsed(now, self.since) >= self.wait {
-            self.since = now;
-            self.wait = character;
-        }
-        let more = character.saturating_mul(bytes as u32);
-        self.wait = self.wait.saturating_add(more);
     }
 }
 
@@ -111,7 +89,7 @@ where
             Ok(false) => Ok(0),
             Ok(true) => match self.device.write(bytes) {
                 Ok(written) => {
-                    self.note_sent(written);
+                    self.transmission.note(written, (self.clock)());
                     Ok(written)
                 }
                 Err(_) => Err(Error::LinkLost),
@@ -125,16 +103,15 @@ where
     }
 
     fn flush(&mut self) -> bool {
-        !self.knows_when_sent() || elapsed((self.clock)(), self.since) >= self.wait
+        !self.knows_when_sent() || self.transmission.has_ended((self.clock)())
     }
 
     fn knows_when_sent(&self) -> bool {
-        self.character > 0
+        self.transmission.is_known()
     }
 
     fn pre_transmission(&mut self) {
-        // The last frame has left, however long ago: the clock may have wrapped.
-        self.wait = 0;
+        self.transmission.begin();
         (self.driver)(true);
     }
 

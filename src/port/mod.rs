@@ -4,13 +4,19 @@
 mod async_io;
 #[cfg(feature = "embedded-io")]
 mod embedded_io;
+#[cfg(feature = "embedded-io-async")]
+mod polled_io;
 #[cfg(feature = "std")]
 mod std_io;
+#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+mod transmission;
 
 #[cfg(feature = "embedded-io-async")]
 pub use self::async_io::AsyncIo;
 #[cfg(feature = "embedded-io")]
 pub use self::embedded_io::EmbeddedIo;
+#[cfg(feature = "embedded-io-async")]
+pub use self::polled_io::PolledIo;
 #[cfg(feature = "std")]
 pub use self::std_io::StdIo;
 
