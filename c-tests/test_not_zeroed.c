@@ -233,6 +233,25 @@ static uint8_t use_ring(void *object, unsigned framing)
     return MBM_OK;
 }
 
+static uint16_t seven_of_sixteen(void *context)
+{
+    return 16 - 7;
+}
+
+static uint8_t use_dma_ring(void *object, unsigned framing)
+{
+    const uint8_t begun = mbm_dmaRing_begin(object, frame, 16, seven_of_sixteen, NULL);
+    uint8_t taken[16];
+
+    if (begun != MBM_OK)
+        return begun;
+    mbm_dmaRing_note(object);
+    assert_int_equal(mbm_dmaRing_available(object), 7);
+    assert_int_equal(mbm_dmaRing_read(object, taken, 16), 7);
+    assert_int_equal(mbm_dmaRing_lost(object), 0);
+    return MBM_OK;
+}
+
 static union {
     mbm_line line;
     mbm_node node;
@@ -244,6 +263,7 @@ static union {
     mbm_sniffer sniffer;
     mbm_trace trace;
     mbm_ring ring;
+    mbm_dmaRing dmaRing;
 } memory;
 
 /* The functions that use an object, with a framing. */
@@ -263,7 +283,8 @@ static union {
     USE(gateway, use_gateway, 0)                                                                   \
     USE(sniffer, use_sniffer, 0)                                                                   \
     USE(trace, use_trace, 0)                                                                       \
-    USE(ring, use_ring, 0)
+    USE(ring, use_ring, 0)                                                                         \
+    USE(dmaRing, use_dma_ring, 0)
 
 #define ROW(object, use, framing) {use, framing},
 static const struct {

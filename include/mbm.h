@@ -45,7 +45,7 @@
  *   mbm/packets.h    Packets: requests and responses, built and parsed by hand.
  *   mbm/sniffer.h    The sniffer: decodes the traffic between other devices.
  *   mbm/trace.h      The trace: calls your hook for each frame sent and received.
- *   mbm/ring.h       The ring: bytes from an interrupt to the main loop.
+ *   mbm/ring.h       The rings: bytes from an interrupt or a DMA to the main loop.
  */
 
 #ifndef MBM_H

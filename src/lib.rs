@@ -208,7 +208,7 @@
 //!
 //! [`plan`], [`gateway`], [`sniffer`] and [`trace`] have no example here: their first lines say how
 //! they work. [`data`] has numbers and texts of several registers, [`ring`] is a receive buffer that
-//! an interrupt fills.
+//! an interrupt fills, [`dma_ring`] one that a DMA fills.
 //!
 //! No module allocates memory, has global variables or panics. The calls that wait are those of
 //! [`client::BlockingClient`] and [`master::Master`], and [`server::Server::run`]; nothing else does. The
@@ -238,13 +238,14 @@ extern crate std;
 /// the same names, to try every order in which writer and reader may run.
 mod atomic {
     #[cfg(not(target_pointer_width = "16"))]
-    pub use core::sync::atomic::AtomicU16 as AtomicPlace;
+    pub use core::sync::atomic::{AtomicU16 as AtomicPlace, AtomicU32 as AtomicWord};
     #[cfg(target_pointer_width = "16")]
-    pub use core::sync::atomic::AtomicU8 as AtomicPlace;
+    pub use core::sync::atomic::{AtomicU8 as AtomicPlace, AtomicU8 as AtomicWord};
     pub use core::sync::atomic::{AtomicU8, Ordering};
 }
 
 mod bytes;
+pub mod dma_ring;
 // Its types are at the root of the crate.
 #[doc(hidden)]
 pub mod error;

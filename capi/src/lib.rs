@@ -56,6 +56,7 @@ macro_rules! functions {
 
 mod bits;
 mod client;
+mod dma_ring;
 mod frame;
 mod framing;
 mod functions;
@@ -80,6 +81,7 @@ mod version;
 
 pub use bits::*;
 pub use client::*;
+pub use dma_ring::*;
 pub use frame::*;
 pub use framing::*;
 pub use functions::*;

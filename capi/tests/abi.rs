@@ -23,7 +23,7 @@ macro_rules! probes {
 
 fn probes() -> Vec<(String, u64)> {
     probes! {
-        sizes: mbm_port mbm_counters mbm_line mbm_node mbm_nodeCallbacks mbm_registers mbm_ring mbm_rule mbm_function
+        sizes: mbm_port mbm_counters mbm_line mbm_node mbm_nodeCallbacks mbm_registers mbm_ring mbm_dmaRing mbm_rule mbm_function
             mbm_length mbm_packet mbm_record mbm_object mbm_framing mbm_server mbm_unit
             mbm_service mbm_registerTable mbm_bitTable mbm_dataCallbacks mbm_file mbm_files mbm_fifo
             mbm_fifos mbm_access mbm_accessHooks mbm_recordHooks mbm_exceptionStatus mbm_serverId mbm_serverIdentification mbm_request mbm_custom

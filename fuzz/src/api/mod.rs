@@ -52,6 +52,7 @@ fn step(w: &World) {
         18 | 19 => gateway::step(w),
         20..=22 => sniffer::step(w),
         23 if w.byte() & 1 == 0 => trace::step(w),
+        23 if w.byte() & 1 == 0 => ring::step_of_dma(w),
         23 => ring::step(w),
         24 | 25 => packet::step(w),
         26 | 27 => frame::step(w),

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 /// The layers from left to right. Modules of one layer may not use each other.
 const LAYERS: [&[&str]; 10] = [
     &["atomic", "error", "time"],
-    &["port", "ring", "data"],
+    &["port", "ring", "dma_ring", "data"],
     &["bytes"],
     &["frame"],
     &["pdu"],
