@@ -2,7 +2,7 @@
  * @file mbm_porttest.h
  * @brief Tests a port of yours on your board, and says in a sentence what is wrong and what to do.
  *
- * Compile mbm_porttest.c, mbm_porttest_line.c and mbm_porttest_hooks.c beside your port, and call
+ * Compile the four mbm_porttest*.c that lie beside this file with your port, and call
  * mbm_portTest_run once from a program that has started the UART and the clock:
  *
  *     static void print(void *context, mbm_portFinding kind, const char *sentence)
@@ -105,6 +105,7 @@ typedef struct mbm_portTest {
     uint8_t isOver;     /**< private */
     uint8_t startsOn;   /**< private */
     uint8_t seed;       /**< private */
+    mbm_port silent;    /**< private */
     mbm_line line;      /**< private */
     mbm_node node;      /**< private */
     uint16_t words[2];  /**< private */

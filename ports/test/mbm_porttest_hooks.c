@@ -6,6 +6,10 @@
  * is over by then on a fast processor. */
 #define MOST_READS 4000000u
 
+/* A time that is too long is measured so often, since other work of a computer makes many too long.
+ */
+enum { TRIES = 64 };
+
 /* --- the clock */
 
 /* Returns whether the clock moves, and notes its shortest step. */
@@ -33,18 +37,19 @@ static uint8_t is_moving(mbm_portTest *test)
     return 1;
 }
 
-/* Watches it for a time of the reference, or of the clock itself. Returns how far it went. */
-static uint32_t watch(mbm_portTest *test, uint32_t us, uint32_t *back)
+/* Watches it for a time of the reference, or of the clock itself. Returns how far it jumped back.
+ */
+static uint32_t watch(mbm_portTest *test, uint32_t us)
 {
     const mbm_port *port = test->port;
-    const uint32_t first = port->micros(port->context);
-    uint32_t before = first, now, time = mbm_portTest_now(test), later, passed = 0;
+    uint32_t before = port->micros(port->context), now, back = 0;
+    uint32_t time = mbm_portTest_now(test), later, passed = 0;
 
     do {
         now = port->micros(port->context);
         /* A step forth of more than half of 2^32 is one back. */
-        if (before - now < UINT32_MAX / 2 && before - now > *back)
-            *back = before - now;
+        if (before - now < UINT32_MAX / 2 && before - now > back)
+            back = before - now;
         before = now;
         mbm_portTest_yield(test);
         /* In steps, since the clock may jump. */
@@ -53,25 +58,54 @@ static uint32_t watch(mbm_portTest *test, uint32_t us, uint32_t *back)
             passed += later - time;
         time = later;
     } while (passed < us);
-    return now - first;
+    return back;
 }
 
-static void compare_rates(mbm_portTest *test, uint32_t went, uint32_t us)
-{
-    /* Both may be a step late; clocks without a crystal are some percent wrong. */
-    const uint32_t may = us / 10 + 2 * test->stepUs;
+/* Both clocks at the same time. */
+typedef struct both {
+    uint32_t port, reference;
+} both;
 
-    if (went + may < us || went > us + may)
+static both read_both(const mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    both now = {0, 0};
+    uint8_t tries;
+
+    /* Other work of a computer may come between them. */
+    for (tries = 0; tries < 100; tries++) {
+        now.reference = mbm_portTest_now(test);
+        now.port = port->micros(port->context);
+        if (mbm_portTest_now(test) - now.reference < 1000)
+            break;
+    }
+    return now;
+}
+
+/* Compares it with the reference for a tenth of a second. */
+static void compare_rates(mbm_portTest *test)
+{
+    const both first = read_both(test);
+    both last;
+    uint32_t went, passed;
+
+    (void)watch(test, 100000);
+    last = read_both(test);
+    went = last.port - first.port;
+    passed = last.reference - first.reference;
+    /* Both may be a step late; clocks without a crystal are some percent wrong. */
+    if (went + passed / 10 + 2 * test->stepUs < passed ||
+        went > passed + passed / 10 + 2 * test->stepUs)
         SAY_NUMBERS(
             test, MBM_PORT_WRONG,
             "`micros` counted % while % us passed: return microseconds (a tick times its length in us, "
             "a cycle counter divided by its cycles in a us).",
-            went, us);
+            went, passed);
 }
 
 void mbm_portTest_checkClock(mbm_portTest *test, uint32_t millis)
 {
-    uint32_t back = 0, went;
+    uint32_t back;
 
     test->checks++;
     if (!is_moving(test)) {
@@ -81,7 +115,7 @@ void mbm_portTest_checkClock(mbm_portTest *test, uint32_t millis)
         return;
     }
     SAY_NUMBERS(test, MBM_PORT_FACT, "`micros` moves in steps of % us.", test->stepUs);
-    went = watch(test, millis * 1000, &back);
+    back = watch(test, millis * 1000);
     if (back > 65000)
         SAY_NUMBERS(
             test, MBM_PORT_WRONG,
@@ -95,7 +129,7 @@ void mbm_portTest_checkClock(mbm_portTest *test, uint32_t millis)
             "interrupt. Read the tick again after the counter, and take both anew if it has changed.",
             back);
     else if (test->reference != NULL)
-        compare_rates(test, went, millis * 1000);
+        compare_rates(test);
 }
 
 /* --- a read without bytes */
@@ -109,7 +143,7 @@ void mbm_portTest_checkRead(mbm_portTest *test)
     test->checks++;
     if (!mbm_portTest_drain(test, port))
         return;
-    for (i = 0; i < 8; i++) {
+    for (i = 0; i < TRIES && shortest > NO_WAIT; i++) {
         const uint32_t began = mbm_portTest_now(test);
         uint32_t took;
 
@@ -133,9 +167,31 @@ enum { SHORT = 4, LONG = 400 };
 
 /* The most by which a sleep may be longer than it should, in microseconds, and the longest time
  * that a byte may lie while `idle` sleeps. */
-enum { OVERSLEEP = 3000, LIES = 100000 };
+enum { OVERSLEEP = 2000, LIES = 100000 };
 
-/* Lets the node wait for the reply to a request that no device answers. */
+/* The requests of the node leave nothing on the line, so that no byte ends a sleep. */
+static int16_t swallow(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    return (int16_t)length;
+}
+
+static void begin_node(mbm_portTest *test)
+{
+    test->silent = *test->port;
+    test->silent.write = swallow;
+    test->silent.flush = NULL;
+    test->silent.preTransmission = NULL;
+    test->silent.postTransmission = NULL;
+    mbm_line_beginRtu(&test->line, &test->silent, test->frame, 64);
+    mbm_line_setGap(&test->line, SHORT * 1000u);
+    mbm_line_setQuietTime(&test->line, 0);
+    mbm_node_begin(&test->node, &test->line, 247, test->words, 2, test->words, 2);
+    mbm_node_setBlocking(&test->node, 0);
+}
+
+/* Lets the node wait for the reply to a request. */
 static uint8_t is_waiting(mbm_portTest *test)
 {
     if (mbm_node_poll(&test->node) == MBM_PENDING)
@@ -143,34 +199,32 @@ static uint8_t is_waiting(mbm_portTest *test)
     return mbm_node_readHoldingRegisters(&test->node, 0, 1) == MBM_PENDING;
 }
 
-/* Returns by how much sleeps were longer than pollDelay allows; 0 if at most two of eight were, as
- * on a computer that has other work. A byte may end one early. */
+/* Returns by how much sleeps are longer than pollDelay allows, at least: other work of a computer
+ * makes many longer. */
 static uint32_t oversleep(mbm_portTest *test)
 {
     const mbm_port *port = test->port;
     const uint32_t began = mbm_portTest_now(test);
     uint32_t least = UINT32_MAX;
-    uint8_t sleeps = 0, longer = 0;
+    uint8_t sleeps = 0;
 
     mbm_node_setResponseTimeout(&test->node, SHORT);
-    while (sleeps < 8 && mbm_portTest_since(test, began) < 3000000u && is_waiting(test)) {
-        const uint32_t may = mbm_node_pollDelay(&test->node);
+    while (sleeps < TRIES && least > OVERSLEEP && mbm_portTest_since(test, began) < 5000000u &&
+           is_waiting(test)) {
+        const uint32_t may = mbm_node_pollDelay(&test->node), before = mbm_portTest_now(test);
+        uint32_t took;
 
         mbm_portTest_yield(test);
-        if (may > 0 && may <= SHORT * 1000u) {
-            const uint32_t before = mbm_portTest_now(test);
-            uint32_t took;
-
-            port->idle(port->context, &test->node);
-            took = mbm_portTest_since(test, before);
-            sleeps++;
-            if (took <= may + OVERSLEEP + test->stepUs)
-                continue;
-            longer++;
-            least = took - may < least ? took - may : least;
-        }
+        if (may == 0 || may > SHORT * 1000u)
+            continue;
+        port->idle(port->context, &test->node);
+        took = mbm_portTest_since(test, before);
+        took = took > may ? took - may : 0;
+        least = took < least ? took : least;
+        sleeps++;
     }
-    return longer >= 3 ? least : 0;
+    mbm_node_cancel(&test->node);
+    return sleeps > 0 ? least : 0;
 }
 
 /* Sends a byte while `idle` may sleep for long, and returns how long the byte lay there. */
@@ -181,7 +235,6 @@ static uint32_t time_of_a_byte(mbm_portTest *test)
     uint8_t byte = 0x55;
 
     mbm_node_setResponseTimeout(&test->node, LONG);
-    /* The request with the short timeout ends first. */
     while (mbm_portTest_since(test, began) < 2000000u && is_waiting(test) &&
            mbm_node_pollDelay(&test->node) < LONG * 700u)
         mbm_portTest_yield(test);
@@ -194,7 +247,26 @@ static uint32_t time_of_a_byte(mbm_portTest *test)
     do
         port->idle(port->context, &test->node);
     while (port->read(port->context, &byte, 1) <= 0 && mbm_portTest_since(test, began) < 1000000u);
-    return mbm_portTest_since(test, began);
+    began = mbm_portTest_since(test, began);
+    mbm_node_cancel(&test->node);
+    return began;
+}
+
+/* The shortest of some tries, as above. */
+static void check_wakeup(mbm_portTest *test)
+{
+    const uint32_t may = LIES + mbm_portTest_characters(test, 2);
+    uint32_t us = may + 1;
+    uint8_t tries;
+
+    for (tries = 0; tries < 3 && us > may && !test->isOver; tries++)
+        us = time_of_a_byte(test);
+    if (us > may && !test->isOver)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`idle` slept for % us while a byte lay there: let the receive interrupt end the sleep, or "
+            "sleep for one tick at most.",
+            us);
 }
 
 void mbm_portTest_checkIdle(mbm_portTest *test)
@@ -207,29 +279,16 @@ void mbm_portTest_checkIdle(mbm_portTest *test)
         return;
     }
     test->checks++;
-    /* A request is short, and the frame buffer holds it and no more. */
-    mbm_line_beginRtu(&test->line, test->port, test->frame, 64);
-    mbm_line_setGap(&test->line, SHORT * 1000u);
-    mbm_line_setQuietTime(&test->line, 0);
-    mbm_node_begin(&test->node, &test->line, 247, test->words, 2, test->words, 2);
-    mbm_node_setBlocking(&test->node, 0);
+    begin_node(test);
     us = oversleep(test);
-    if (us > 0)
+    if (us > OVERSLEEP + test->stepUs)
         SAY_NUMBERS(
             test, MBM_PORT_WRONG,
             "`idle` slept at least % us longer than mbm_node_pollDelay allowed: round ticks down, and do "
             "not sleep for less than one.",
             us);
-    if (mbm_portTest_has_wire(test)) {
-        us = time_of_a_byte(test);
-        if (us > LIES + mbm_portTest_characters(test, 2))
-            SAY_NUMBERS(
-                test, MBM_PORT_WRONG,
-                "`idle` slept for % us while a byte lay there: let the receive interrupt end the sleep, or "
-                "sleep for one tick at most.",
-                us);
-    }
-    mbm_node_cancel(&test->node);
+    if (mbm_portTest_has_wire(test))
+        check_wakeup(test);
 }
 
 /* --- a second start, and an error on the line */
