@@ -3,9 +3,10 @@
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
 
 use embedded_hal_async::delay::DelayNs;
-use mbm::client::{Client, Frame, Request, Serial, Tcp, TcpBuffers};
+use mbm::client::{AsyncClient, Call, Client, Frame, Request, Serial, Tcp, TcpBuffers};
 use mbm::master::{AsyncMaster, Buffers, Master};
-use mbm::port::EmbeddedIo;
+use mbm::pdu::identification::DeviceIdCode;
+use mbm::port::{AsyncIo, EmbeddedIo};
 use mbm::server::Server;
 use mbm::{Error, Status};
 use std::convert::Infallible;
@@ -72,6 +73,10 @@ impl DelayNs for Delay {
 }
 
 type Port = EmbeddedIo<Uart, fn() -> u32>;
+type Io = AsyncIo<Uart, fn() -> u32, Delay>;
+type AsyncRtu = AsyncClient<Serial<Io, Frame<[u8; 256]>, Call>>;
+type AsyncAscii = AsyncClient<Serial<Io, Frame<[u8; 513]>, Call>>;
+type AsyncTcp = AsyncClient<Tcp<Io, TcpBuffers<[u8; 260], [u8; 260]>>>;
 type Words = Buffers<[u8; 64], [u16; 20], [u16; 20]>;
 type Rtu = Client<Serial<Port, Frame<[u8; 256]>, Request<'static>>, Request<'static>, 2>;
 type TcpIp = Client<Tcp<Port, TcpBuffers<[u8; 260], [u8; 260]>>, Request<'static>, 2>;
@@ -85,6 +90,10 @@ fn micros() -> u32 {
 struct App {
     master: Master<Port, Words>,
     awaited: AsyncMaster<Uart, fn() -> u32, Delay, Words>,
+    async_rtu: AsyncRtu,
+    async_ascii: AsyncAscii,
+    async_rtu_over_tcp: AsyncRtu,
+    async_tcp: AsyncTcp,
     rtu: Rtu,
     tcp: TcpIp,
     server: Server<Port, [u8; 256]>,
@@ -103,6 +112,10 @@ static APP: Mutex<App> = Mutex::new(App {
         Delay,
         Buffers::new([0; 64], [0; 20], [0; 20]),
     ),
+    async_rtu: AsyncClient::rtu(AsyncIo::serial(Uart, micros, Delay)),
+    async_ascii: AsyncClient::ascii(AsyncIo::serial(Uart, micros, Delay)),
+    async_rtu_over_tcp: AsyncClient::rtu_over_tcp(AsyncIo::stream(Uart, micros, Delay)),
+    async_tcp: AsyncClient::tcp(AsyncIo::stream(Uart, micros, Delay)),
     rtu: Client::new(Serial::new(
         EmbeddedIo::serial(Uart, || 8),
         Frame::new([0; 256]),
@@ -121,6 +134,10 @@ fn a_static_holds_master_client_and_server() {
     app.rtu.settings().set_baud_rate(19_200);
     assert_eq!(app.rtu.settings(), app.master.settings());
     app.awaited.set_unit(18);
+    app.async_rtu.settings().set_baud_rate(19_200);
+    app.async_ascii.settings().set_baud_rate(9_600);
+    app.async_rtu_over_tcp.reconnect();
+    assert_eq!(app.async_tcp.unanswered(), 0);
     assert_eq!(mbm::port::Port::micros(app.master.port()), 7);
     assert_eq!(mbm::port::Port::micros(app.rtu.port()), 8);
     assert_eq!(app.rtu.poll_delay(0), u32::MAX);
@@ -141,6 +158,11 @@ fn a_thread_or_task_may_take_each_object() {
         let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
         let mut master = AsyncMaster::new(17, Uart, micros, Delay, buffers);
         master.read_holding_registers(107, &mut [0; 2]).await
+    });
+    may_be_moved(async {
+        let mut client = AsyncClient::tcp(AsyncIo::stream(Uart, micros, Delay));
+        client.read_holding_registers(17, 107, &mut [0; 2]).await?;
+        client.identify(17, DeviceIdCode::Basic, |_, _| {}).await
     });
 }
 

@@ -4,7 +4,7 @@ use super::call::{
     take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
     CALL_BYTES,
 };
-use super::calls::calls;
+use super::calls::{accessors, calls};
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
 use super::transaction::Serial;
@@ -145,40 +145,12 @@ impl<L: Transport<Call<D>>, const D: usize> BlockingClient<L, D> {
         }
     }
 
-    /// Timeouts and other settings of requests: see [`Client::settings`].
-    pub fn settings(&mut self) -> &mut Settings {
-        self.client.settings()
-    }
-
-    /// The policy for retries.
-    pub fn policy(&mut self) -> &mut Policy {
-        self.client.policy()
-    }
-
-    /// The port. Call [`BlockingClient::reconnect`] after a new socket was put in its place.
-    pub fn port(&mut self) -> &mut L::Port {
-        self.client.port()
-    }
-
-    /// The buffers, with the counters.
-    pub fn storage(&mut self) -> &mut L::Storage {
-        self.client.storage()
-    }
-
-    /// The serial line or TCP stream.
-    pub fn line(&mut self) -> &mut L {
-        &mut self.client.line
-    }
-
     /// Call this after the link was opened anew: see [`Client::reconnect`].
     pub fn reconnect(&mut self) {
         self.client.reconnect();
     }
 
-    /// Calls in a row that timed out: see [`Client::unanswered`].
-    pub fn unanswered(&self) -> u8 {
-        self.client.unanswered()
-    }
+    accessors! {}
 }
 
 impl<L: Transport<Call<D>, Port: Port>, const D: usize> BlockingClient<L, D> {

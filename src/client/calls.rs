@@ -508,4 +508,39 @@ macro_rules! calls {
     };
 }
 
-pub(super) use calls;
+/// The parts of such a client.
+macro_rules! accessors {
+    () => {
+        /// Timeouts and other settings of requests: see [`Client::settings`].
+        pub fn settings(&mut self) -> &mut Settings {
+            self.client.settings()
+        }
+
+        /// The policy for retries.
+        pub fn policy(&mut self) -> &mut Policy {
+            self.client.policy()
+        }
+
+        /// The port. Call [`Self::reconnect`] after a new socket was put in its place.
+        pub fn port(&mut self) -> &mut L::Port {
+            self.client.port()
+        }
+
+        /// The buffers, with the counters.
+        pub fn storage(&mut self) -> &mut L::Storage {
+            self.client.storage()
+        }
+
+        /// The serial line or TCP stream.
+        pub fn line(&mut self) -> &mut L {
+            &mut self.client.line
+        }
+
+        /// Calls in a row that timed out: see [`Client::unanswered`].
+        pub fn unanswered(&self) -> u8 {
+            self.client.unanswered()
+        }
+    };
+}
+
+pub(super) use {accessors, calls};

@@ -5,6 +5,8 @@
 //! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
 //! between a request and a frame buffer.
 
+#[cfg(feature = "embedded-io-async")]
+mod asynchronous;
 mod blocking;
 mod call;
 mod calls;
@@ -20,6 +22,8 @@ mod tcp;
 mod transaction;
 mod units;
 
+#[cfg(feature = "embedded-io-async")]
+pub use asynchronous::AsyncClient;
 pub use blocking::BlockingClient;
 // Only the calls of a client that waits have it.
 #[doc(hidden)]
@@ -229,6 +233,10 @@ pub trait Transport<J> {
     #[doc(hidden)]
     fn storage(&mut self) -> &mut Self::Storage;
 
+    /// The port, and the `length` bytes that it has accepted in its last write. They stay where they
+    /// are until a later one.
+    fn accepted(&mut self, length: u16) -> (&mut Self::Port, &[u8]);
+
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
     /// true in the first call of each poll, when new bytes may have arrived.
     // The client calls it.
@@ -239,6 +247,12 @@ pub trait Transport<J> {
         now: u32,
         fresh: bool,
     ) -> Option<J>;
+
+    /// Notes that the last request, which was cancelled while it was sent, has left only now: its
+    /// unit may answer from now on.
+    fn note_sent_late(&mut self, now: u32) {
+        let _ = now;
+    }
 
     /// Discards the state of one request in flight; with `None`, of all requests and of
     /// all partly received or partly sent frames.

@@ -116,6 +116,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         &mut self.storage
     }
 
+    fn accepted(&mut self, length: u16) -> (&mut P, &[u8]) {
+        (&mut self.port, self.storage.slice(0, length))
+    }
+
     fn advance<const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -160,6 +164,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Serial<P, S, 
         }
         // The queue has space: the active request has always counted as part of it.
         queue.conclude(request, status, now, &mut self.storage)
+    }
+
+    fn note_sent_late(&mut self, now: u32) {
+        self.note_sent_late(now);
     }
 
     fn release(&mut self, request: Option<&J>) {

@@ -137,6 +137,12 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         place
     }
 
+    /// Notes that the last request, which was cancelled while it was sent, has left only now.
+    pub fn note_sent_late(&mut self, now: u32) {
+        self.now = now;
+        self.write_record(now);
+    }
+
     /// Notes that no reply comes any more: the line is a new one.
     pub fn forget_late_replies(&mut self) {
         self.is_late = false;

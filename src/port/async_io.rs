@@ -25,15 +25,30 @@ enum Outgoing {
     Stuck,
 }
 
-/// The [`Port`] between the core, which never waits, and a device that is awaited. It accepts each
-/// frame as a whole. Its owner polls the core, then awaits [`AsyncIo::send`] if the core has written a
-/// frame, otherwise [`AsyncIo::receive`] or [`AsyncIo::pause`].
+/// A [`Port`] over a device that is awaited, for clients whose functions are futures:
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+/// use mbm::client::AsyncClient;
+/// use mbm::port::AsyncIo;
+///
+/// async fn read() -> Result<[u16; 2], mbm::Error> {
+///     let mut client = AsyncClient::rtu(AsyncIo::serial(uart(), micros, Delay));
+///     client.settings().set_baud_rate(19200);
+///     client.holding_registers(17, 107).await
+/// }
+/// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+/// ```
+///
+/// Such a client awaits the device. For a client or server that is polled, the port receives nothing.
 ///
 /// - `D` is the device: [`Read`] and [`Write`] of embedded-io-async. Its read must lose no byte if
 ///   its future is dropped, as a UART with a receive buffer does; and a socket must have sent none if
 ///   the future of a write is dropped.
 /// - `C` is the clock, in microseconds, which wraps at 2^32. `T` is [`DelayNs`] of
 ///   embedded-hal-async. An executor's timer has both.
+// The port accepts each frame as a whole. Its owner polls the core, then awaits `send` if the core has
+// written a frame, otherwise `receive` or `pause`.
 #[derive(Debug)]
 pub struct AsyncIo<D, C, T, E = fn(bool)> {
     /// The UART or socket.
@@ -101,8 +116,19 @@ impl<D, C, T> AsyncIo<D, C, T> {
         AsyncIo::serial_with_driver(uart, clock, timer, |_| {})
     }
 
-    /// A port of a socket. An error, the end of the stream, or a frame that the socket does not take
-    /// in time, mean that the link is lost, until the program has opened it anew.
+    /// A port of a socket, or of another stream that keeps all bytes in order, as USB. An error, the
+    /// end of the stream, or a frame that the socket does not take in time, mean that the link is lost,
+    /// until the program has opened it anew.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+    /// # async fn read() -> Result<[u16; 2], mbm::Error> {
+    /// # use mbm::{client::AsyncClient, port::AsyncIo};
+    /// let mut client = AsyncClient::tcp(AsyncIo::stream(socket(), micros, Delay));
+    /// client.holding_registers(17, 107).await
+    /// # }
+    /// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+    /// ```
     pub const fn stream(socket: D, clock: C, timer: T) -> Self {
         AsyncIo::new(socket, clock, timer, |_| {}, false)
     }
@@ -111,6 +137,20 @@ impl<D, C, T> AsyncIo<D, C, T> {
 impl<D, C, T, E> AsyncIo<D, C, T, E> {
     /// As [`AsyncIo::serial`], with an RS-485 driver: `driver` switches it on with `true` before the
     /// first byte is sent, and off after the last one.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+    /// # async fn read() -> Result<[u16; 2], mbm::Error> {
+    /// # use mbm::{client::AsyncClient, port::AsyncIo};
+    /// # use std::cell::Cell;
+    /// # let pin = Cell::new(false);
+    /// let driver = |is_on| pin.set(is_on);
+    /// let port = AsyncIo::serial_with_driver(uart(), micros, Delay, driver);
+    /// let mut client = AsyncClient::rtu(port);
+    /// client.holding_registers(17, 107).await
+    /// # }
+    /// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+    /// ```
     pub const fn serial_with_driver(uart: D, clock: C, timer: T, driver: E) -> Self {
         AsyncIo::new(uart, clock, timer, driver, true)
     }
@@ -141,6 +181,18 @@ impl<D, C, T, E> AsyncIo<D, C, T, E> {
         if self.is_serial {
             self.is_lost = false;
         }
+    }
+
+    /// Forgets all that belongs to a link that was lost: a new one is in its place.
+    pub(crate) fn reconnect(&mut self) {
+        self.outgoing = Outgoing::None;
+        self.is_lost = false;
+        self.end = self.start;
+    }
+
+    /// True if the device did not take a frame in time.
+    pub(crate) fn is_stuck(&self) -> bool {
+        self.outgoing == Outgoing::Stuck
     }
 
     /// The length of the frame that the core has written and that is to be sent; `None` if there is
@@ -213,8 +265,8 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
         };
         let sent = first(send, self.timer.delay_us(limit)).await;
         self.outgoing = match sent {
-            Some(_) => Outgoing::None,
-            None => Outgoing::Stuck,
+            None if self.is_serial => Outgoing::Stuck,
+            _ => Outgoing::None,
         };
         self.note_link(match sent {
             Some(Ok(true)) => false,
@@ -226,7 +278,12 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
 
     /// Waits for `delay` microseconds, or until bytes have arrived.
     pub(crate) async fn receive(&mut self, delay: u32) {
+        let is_lost = self.is_lost;
         let (device, timer, place) = self.place();
+        if is_lost {
+            // The core has to see it.
+            return timer.delay_us(delay.min(PAUSE)).await;
+        }
         if place.is_empty() {
             return timer.delay_us(delay).await;
         }

@@ -1,4 +1,4 @@
-// The code that the example of the asynchronous master hides: an executor, its timer, and a UART.
+// The code that the examples with futures hide: an executor, its timer, UARTs and a socket.
 
 use std::future::{pending, poll_fn, Future};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -73,6 +73,22 @@ impl embedded_io_async::Write for Uart {
 fn uart() -> Uart {
     Uart {
         sends: &[17, 3, 4, 0x02, 0x2B, 0x00, 0x64, 0x9B, 0xA9],
+        arriving: &[],
+    }
+}
+
+/// The same line, with ASCII frames.
+fn ascii_uart() -> Uart {
+    Uart {
+        sends: b":110304022B006457\r\n",
+        arriving: &[],
+    }
+}
+
+/// A connection to the same unit, which answers the first request.
+fn socket() -> Uart {
+    Uart {
+        sends: &[0, 0, 0, 0, 0, 7, 17, 3, 4, 0x02, 0x2B, 0x00, 0x64],
         arriving: &[],
     }
 }

@@ -495,6 +495,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for Tcp<P, S> {
         &mut self.storage
     }
 
+    fn accepted(&mut self, length: u16) -> (&mut P, &[u8]) {
+        (&mut self.port, self.storage.to_send(0, length))
+    }
+
     fn advance<const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,

@@ -204,6 +204,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for TolerantTcp<P
         &mut self.tcp.storage
     }
 
+    fn accepted(&mut self, length: u16) -> (&mut P, &[u8]) {
+        Transport::<J>::accepted(&mut self.tcp, length)
+    }
+
     fn advance<const N: usize>(
         &mut self,
         queue: &mut RequestQueue<J, N>,
@@ -211,6 +215,10 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Transport<J> for TolerantTcp<P
         fresh: bool,
     ) -> Option<J> {
         self.tcp.advance_by(queue, now, fresh, &mut self.tolerance)
+    }
+
+    fn note_sent_late(&mut self, now: u32) {
+        self.tolerance.sent = now;
     }
 
     fn release(&mut self, request: Option<&J>) {
