@@ -44,6 +44,7 @@
 #include "ModbusTransmission.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusStatusText.h"
+#include "ModbusUsb.h"
 #include "mbm/client.h"
 
 /** @cond the macros are explained at the head of the file */
@@ -88,6 +89,17 @@ public:
         if (status == MBM_OK && baud != 0)
             setBaudRate(baud);
         return status;
+    }
+    /**
+     * As begin, for a serial port over USB whose class the library does not know. Over USB bytes
+     * come in packets, and silence means nothing: the client keeps no gap, and does not broadcast.
+     */
+    uint8_t beginUsb(Stream &line) { return attach(mbm_client_beginRtuOverTcp, line); }
+    /** begin for a port whose class is known to be a serial port over USB: as beginUsb. */
+    template <typename Port>
+    auto begin(Port &line, uint32_t = 0) -> typename ModbusPort<Port>::Usb
+    {
+        return beginUsb(line);
     }
     /** As begin, with ASCII instead of RTU. */
     uint8_t beginAscii(Stream &line) { return attach(mbm_client_beginAscii, line); }

@@ -31,6 +31,7 @@
 #include "ModbusMasterUart.h"
 #include "ModbusMasterValues.h"
 #include "ModbusStatusText.h"
+#include "ModbusUsb.h"
 #include "mbm/master.h"
 
 /**
@@ -122,9 +123,11 @@ public:
      * As begin(slave, stream), for a port whose class has baudRate(), as those of the ESP8266 and
      * the ESP32. The silence before a request is t3.5 of that rate then, as if you had called
      * setBaudRate, unless you have called setBaudRate, setGap or begin(baud) for this
-     * object. Open the port first; call begin again after you have changed its rate.
+     * object. Open the port first; call begin again after you have changed its rate. The rate of a
+     * port over USB means nothing, and is left out of account.
      */
-    template <typename Port, typename = decltype(static_cast<Port *>(nullptr)->baudRate())>
+    template <typename Port, typename = typename ModbusPort<Port>::Wire,
+              typename = decltype(static_cast<Port *>(nullptr)->baudRate())>
     void begin(uint8_t slave, Port &port)
     {
         begin(slave, static_cast<Stream &>(port));

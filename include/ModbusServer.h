@@ -36,6 +36,7 @@
 #include "ModbusMasterBoards.h"
 #include "ModbusServerTables.h"
 #include "ModbusStatusText.h"
+#include "ModbusUsb.h"
 #include "mbm/server.h"
 
 /** @cond the macro is explained at the head of the file */
@@ -177,7 +178,7 @@ public:
      * Answers as unit `id` over a Stream that is already open. May be called again: a request
      * that it has not answered is dropped; the unit keeps its tables and functions. If the
      * Stream has setRxFIFOFull, as on an ESP32, the receiver hands over each byte at once from
-     * then on.
+     * then on. If its class is known to be a serial port over USB, this is beginUsb.
      *
      * @param id      1 to 247
      * @param stream  must outlive its use here
@@ -188,7 +189,8 @@ public:
     template <typename Port> uint8_t begin(uint16_t id, Port &stream, uint32_t baud = 0)
     {
         const uint16_t before = setID(id);
-        return keepID(before, receiveAtOnce(stream, beginRtu(*this, 1, stream, baud)));
+        return keepID(before,
+                      beginOver(typename ModbusPort<Port>::Kind(), *this, 1, stream, baud));
     }
 
     /** As begin, for all units of an array, which answer instead of this one. */
@@ -196,7 +198,26 @@ public:
     uint8_t begin(ModbusUnit (&units)[N], Port &stream, uint32_t baud = 0)
     {
         static_assert(N <= 247, "a line has 247 units");
-        return receiveAtOnce(stream, beginRtu(units[0], N, stream, baud));
+        return beginOver(typename ModbusPort<Port>::Kind(), units[0], N, stream, baud);
+    }
+
+    /**
+     * As begin, for a serial port over USB whose class the library does not know. Over USB bytes
+     * come in packets, and silence means nothing: a frame ends where its bytes say so, and the
+     * response follows at once. There are no other devices and no broadcasts: units 0 and 255 are
+     * this unit too. Damaged bytes are dropped after half a second of silence.
+     */
+    uint8_t beginUsb(uint16_t id, Stream &stream)
+    {
+        const uint16_t before = setID(id);
+        return keepID(before, listen(mbm_server_beginRtuOverTcp, *this, 1, stream));
+    }
+
+    /** As beginUsb, for all units of an array. */
+    template <size_t N> uint8_t beginUsb(ModbusUnit (&units)[N], Stream &stream)
+    {
+        static_assert(N <= 247, "a line has 247 units");
+        return listen(mbm_server_beginRtuOverTcp, units[0], N, stream);
     }
 
     /** As begin, with ASCII instead of RTU; a frame takes twice as many bytes and 1. */
@@ -316,6 +337,17 @@ private:
         if (status == MBM_OK)
             setBaudRate(baud);
         return status;
+    }
+
+    template <typename Port>
+    uint8_t beginOver(ModbusOverWire, ModbusUnit &first, uint8_t count, Port &stream, uint32_t baud)
+    {
+        return receiveAtOnce(stream, beginRtu(first, count, stream, baud));
+    }
+    template <typename Port>
+    uint8_t beginOver(ModbusOverUsb, ModbusUnit &first, uint8_t count, Port &stream, uint32_t)
+    {
+        return listen(mbm_server_beginRtuOverTcp, first, count, stream);
     }
 
     // A Stream with setRxFIFOFull, and any other.

@@ -32,6 +32,7 @@
 #include <stdint.h>
 
 #include "ModbusCallback.h"
+#include "ModbusDriverPin.h"
 #include "ModbusMasterBoards.h"
 #include "ModbusSnifferText.h"
 #include "mbm/sniffer.h"
@@ -76,6 +77,18 @@ public:
     uint8_t beginAscii(Stream &line)
     {
         return beginAs(line, MBM_FRAMING_ASCII);
+    }
+
+    /**
+     * Keeps the transceiver receiving, by a pin that its DE and /RE are joined to: makes the pin
+     * an output with the level for receiving.
+     *
+     * @param pin    the number that digitalWrite takes; on AVR at most 127
+     * @param level  the level with which the transceiver would send
+     */
+    static void setDriverPin(ModbusDriverPin::Pin pin, uint8_t level = 1)
+    {
+        ModbusDriverPin::begin(ModbusDriverPin::of(pin, level != 0));
     }
 
     /** Prints each event as a line; see modbusPrintEvent. */

@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "ModbusDriverPin.h"
 #include "mbm/base.h"
 
 /** @cond for the classes that have callbacks */
@@ -58,11 +59,45 @@ inline mbm_port modbusPort(void *context, int16_t (*read)(void *, uint8_t *, uin
 /** @endcond */
 
 /**
- * The callbacks around each transmission, for a line with an RS-485 driver. `Owner` is the
- * class that has them.
+ * The driver's pin, or callbacks around each transmission, for a line with an RS-485 driver.
+ * `Owner` is the class that has them.
  */
 template <typename Owner> class ModbusTransmissionHooks {
 public:
+    /**
+     * Lets the object switch the driver of an RS-485 transceiver, at a pin that DE and /RE are
+     * joined to. Makes the pin an output, and switches the driver off. Call it in setup, before
+     * or after begin. It takes the place of the callbacks below.
+     *
+     * @param pin    the number that digitalWrite takes; on AVR at most 127
+     * @param level  HIGH or LOW: the level with which the transceiver sends
+     */
+    void setDriverPin(ModbusDriverPin::Pin pin, uint8_t level = 1)
+    {
+        const uintptr_t driver = ModbusDriverPin::of(pin, level != 0);
+        ModbusDriverPin::begin(driver);
+        preTransmission(ModbusDriverPin::send, ModbusDriverPin::contextOf(driver));
+        postTransmission(ModbusDriverPin::receive, ModbusDriverPin::contextOf(driver));
+    }
+    /**
+     * As setDriverPin, for DE and /RE at two pins: the receiver is off while the object sends.
+     *
+     * @param driver         the pin at DE
+     * @param receiver       the pin at /RE
+     * @param driverLevel    the level with which the transceiver sends
+     * @param receiverLevel  the level with which it receives
+     */
+    void setDriverPins(ModbusDriverPin::Pin driver, ModbusDriverPin::Pin receiver,
+                       uint8_t driverLevel = 1, uint8_t receiverLevel = 0)
+    {
+        const uintptr_t first = ModbusDriverPin::of(driver, driverLevel != 0),
+                        second = ModbusDriverPin::of(receiver, receiverLevel == 0);
+        ModbusDriverPin::begin(first);
+        ModbusDriverPin::begin(second);
+        preTransmission(ModbusDriverPin::sendTwo, ModbusDriverPin::contextOf(first, second));
+        postTransmission(ModbusDriverPin::receiveTwo, ModbusDriverPin::contextOf(first, second));
+    }
+
     /** Sets a callback before each transmission (RS-485 driver on); nullptr for none. */
     void preTransmission(void (*callback)()) { owner().preHookOf().set(callback); }
     /** As preTransmission(callback), with `context` as its argument. */

@@ -50,7 +50,7 @@ SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(ARDUINO_EXAMPLES))
 MEGA_SKETCHES := TwoPorts OlderCalls
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
 AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(ARDUINO_EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
-            $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) \
+            $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) $(AVR_OUT)/leonardo/UsbTypes.elf \
             $(patsubst %,$(AVR_OUT)/uno/%.elf,$(filter-out $(MEGA_SKETCHES),$(TEST_SKETCHES))) \
             $(MEGA_SKETCHES:%=$(AVR_OUT)/mega/%.elf) $(AVR_OUT)/mega/Rates.elf $(AVR_OUT)/mega/Silences.elf
 # Sketches that run with shortened calls and jumps too.

@@ -137,7 +137,7 @@ HEADERS = ["ModbusMaster.h", "ModbusMasterConstants.h", "ModbusMasterHelpers.h",
            "ModbusMasterValues.h", "ModbusServer.h", "ModbusServerTables.h", "ModbusStatusText.h", "mbm.h",
            *(f"mbm/{part.name}" for part in sorted((ROOT / "include/mbm").glob("*.h"))),
            "ModbusClient.h", "ModbusClientCalls.h", "ModbusRequest.h", "ModbusValues.h", "ModbusNumbers.h",
-           "ModbusCallback.h", "ModbusTransmission.h",
+           "ModbusCallback.h", "ModbusDriverPin.h", "ModbusTransmission.h", "ModbusUsb.h",
            "ModbusTcpServer.h", "ModbusTcpConnections.h", "ModbusTcpGateway.h", "ModbusSniffer.h",
            "ModbusSnifferText.h"]
 

@@ -21,16 +21,12 @@ const uint16_t powerAt = 12;
 
 ModbusMaster first;
 
-void driverOn() { digitalWrite(driverEnable, HIGH); }
-void driverOff() { digitalWrite(driverEnable, LOW); }
-
 void begin(ModbusMaster &meter, uint8_t unit) {
   meter.begin(unit, bus);
   meter.setBaudRate(9600);
   meter.setResponseTimeout(300); // milliseconds
   meter.setRetries(1);
-  meter.preTransmission(driverOn);
-  meter.postTransmission(driverOff);
+  meter.setDriverPin(driverEnable); // high while a request leaves
   // meter.setWordOrder(meter.orderCDAB); // if your meter has the low word first
 }
 
@@ -59,8 +55,6 @@ void print(ModbusMaster &meter) {
 }
 
 void setup() {
-  driverOff();
-  pinMode(driverEnable, OUTPUT);
   Serial.begin(9600); // the rate to choose in the serial monitor
   bus.begin(9600);    // the rate of the meter, 8N1
   begin(first, 1);

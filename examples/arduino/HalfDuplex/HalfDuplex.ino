@@ -1,32 +1,44 @@
-// RS-485 with a transceiver such as the MAX485. Connect DE and /RE to pin 2: the
-// transceiver drives the line only while the sketch sends a request.
+// RS-485 with a transceiver such as the MAX485 (5 V) or the MAX3485 (3.3 V). DE and /RE are joined at
+// one pin: the transceiver drives the line only while the sketch sends a request.
 #include <ModbusMaster.h>
 
-#if (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1)) || defined(ESP8266) || \
-    defined(ARDUINO_ARCH_STM32)
-#define BUS Serial // there may be no other UART: disconnect the bus from it to upload
+// The pins RO, DI and driverPin of a board of each core.
+#if defined(ARDUINO_ARCH_STM32) // Blue Pill, Nucleo F103RB
+HardwareSerial bus(PA10, PA9); // RO, DI
+const uint8_t driverPin = PA8;
+#elif defined(ESP32) // ESP32 DevKit: RO at GPIO16, DI at GPIO17
+#define bus Serial1
+const uint8_t driverPin = 4;
+#elif defined(ARDUINO_ARCH_RP2040) // Pico: RO at GP9, DI at GP8
+#if defined(ARDUINO_ARCH_MBED)
+UART bus(8, 9); // DI, RO
 #else
-#define BUS Serial1 // Serial stays free for messages
+#define bus Serial2
 #endif
-
-const uint8_t driverEnable = 2;
+const uint8_t driverPin = 10;
+#elif defined(ESP8266) || (defined(__AVR__) && !defined(UBRR1H) && !defined(USART1))
+#define bus Serial // Uno, Nano: there is no other UART, so disconnect the bus from it to upload
+const uint8_t driverPin = 2;
+#else
+#define bus Serial1 // Mega, Leonardo, Zero, Teensy: RO at RX1, DI at TX1. Serial is for messages
+const uint8_t driverPin = 2;
+#endif
 const uint8_t led = 13; // the built-in one of many boards
 
 ModbusMaster node;
 
-void driverOn() { digitalWrite(driverEnable, HIGH); }
-void driverOff() { digitalWrite(driverEnable, LOW); }
-
 void setup() {
   pinMode(led, OUTPUT);
-  driverOff();
-  pinMode(driverEnable, OUTPUT);
 
-  BUS.begin(9600);
-  node.begin(1, BUS);
+#if defined(ESP32)
+  bus.begin(9600, SERIAL_8N1, 16, 17); // its UARTs take any pins
+#else
+  bus.begin(9600); // 8N1
+#endif
+  node.begin(1, bus);
   node.setBaudRate(9600);
-  node.preTransmission(driverOn);
-  node.postTransmission(driverOff); // called after the last bit
+  node.setDriverPin(driverPin); // high while a request leaves; for the other level (driverPin, LOW)
+  // If DE and /RE are at pins of their own, for example 3 and 2: node.setDriverPins(3, 2);
   node.setRetries(1); // repeats a request once if it gets no correct reply
 
   // If your core's Serial.flush() returns before the last bit, keep the driver on longer:

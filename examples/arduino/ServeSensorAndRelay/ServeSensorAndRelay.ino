@@ -18,23 +18,17 @@ ModbusBitArray<1> relay;
 ModbusHooks relayHooks;
 ModbusServer server;
 
-void driverOn() { digitalWrite(driverEnable, HIGH); }
-void driverOff() { digitalWrite(driverEnable, LOW); }
-
 void relayWritten(const mbm_access &) { digitalWrite(relayPin, relay[0] ? HIGH : LOW); }
 
 void setup() {
   digitalWrite(relayPin, LOW);
   pinMode(relayPin, OUTPUT);
-  driverOff();
-  pinMode(driverEnable, OUTPUT);
 
   server.inputRegisters(sensor);
   server.coils(relay);
   relayHooks.afterWrite(relayWritten);
   relay.setHooks(relayHooks);
-  server.preTransmission(driverOn);
-  server.postTransmission(driverOff); // called after the last bit
+  server.setDriverPin(driverEnable); // high while a response leaves
 
   BUS.begin(19200);
   server.begin(17, BUS, 19200);

@@ -13,16 +13,10 @@ WiFiServer wifi(502);
 ModbusSerialClient line;
 ModbusTcpGateway<WiFiServer> gateway; // up to four clients at once
 
-void driverOn() { digitalWrite(driverEnable, HIGH); }
-void driverOff() { digitalWrite(driverEnable, LOW); }
-
 void setup() {
-  driverOff();
-  pinMode(driverEnable, OUTPUT);
   Serial.begin(baud);
   line.begin(Serial, baud);
-  line.preTransmission(driverOn);
-  line.postTransmission(driverOff); // called after the last bit
+  line.setDriverPin(driverEnable); // high while a request leaves
   line.setResponseTimeout(500);
   WiFi.begin(name, password);
   wifi.begin();
