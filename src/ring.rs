@@ -19,6 +19,12 @@ pub type Place = u8;
 pub const MAX_STORAGE: usize = Place::MAX as usize + if size_of::<Place>() == 1 { 1 } else { 0 };
 
 /// The positions of writer and reader.
+///
+/// ```
+/// use mbm::ring::Positions;
+///
+/// static POSITIONS: Positions = Positions::new();
+/// ```
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Positions {
@@ -42,6 +48,27 @@ impl Positions {
 }
 
 /// A ring in storage of the caller, of at most [`MAX_STORAGE`] bytes.
+///
+/// ```
+/// use mbm::ring::{Positions, Ring};
+/// use std::sync::atomic::AtomicU8;
+///
+/// static BYTES: [AtomicU8; 64] = [const { AtomicU8::new(0) }; 64];
+/// static POSITIONS: Positions = Positions::new();
+/// static RECEIVED: Ring = Ring::new(&BYTES, &POSITIONS);
+///
+/// // In the interrupt handler of the UART, or of its DMA:
+/// RECEIVED.put(17);
+/// RECEIVED.write(&[3, 4]);
+///
+/// // In `Port::read`, which the main loop calls:
+/// assert_eq!(RECEIVED.available(), 3);
+/// let mut bytes = [0; 8];
+/// assert_eq!(RECEIVED.read(&mut bytes), 3);
+/// assert_eq!(bytes[..3], [17, 3, 4]);
+/// assert_eq!(RECEIVED.lost(), 0);
+/// RECEIVED.clear();
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Ring<'a> {
     bytes: &'a [AtomicU8],

@@ -34,6 +34,13 @@ const FAST_SILENCE: u32 = 1_750;
 
 /// Microseconds from `since` to `now`; 0 if the clock stepped back a little, so that `now`
 /// is before `since`.
+///
+/// ```
+/// use mbm::time::elapsed;
+///
+/// // The clock has wrapped in between.
+/// assert_eq!(elapsed(5, u32::MAX - 4), 10);
+/// ```
 #[inline(always)]
 pub const fn elapsed(now: u32, since: u32) -> u32 {
     let time = now.wrapping_sub(since);
@@ -62,6 +69,10 @@ pub(crate) const fn clamped(microseconds: u32) -> u32 {
 }
 
 /// Converts milliseconds to microseconds.
+///
+/// ```
+/// assert_eq!(mbm::time::millis(20), 20_000);
+/// ```
 #[inline(always)]
 pub const fn millis(milliseconds: u16) -> u32 {
     milliseconds as u32 * 1000
@@ -83,6 +94,11 @@ pub(crate) const fn timeout_at_most(milliseconds: u32) -> u32 {
 }
 
 /// Converts a timeout in milliseconds to microseconds. `None` above 1 000 000.
+///
+/// ```
+/// assert_eq!(mbm::time::timeout(500), Some(500_000));
+/// assert_eq!(mbm::time::timeout(1_000_001), None);
+/// ```
 #[cfg_attr(target_os = "none", inline(never))]
 pub const fn timeout(milliseconds: u32) -> Option<u32> {
     if milliseconds > LONGEST_TIMEOUT_MS {
@@ -94,6 +110,11 @@ pub const fn timeout(milliseconds: u32) -> Option<u32> {
 
 /// The length of a character of 11 bits, in microseconds, rounded up, at most 65535.
 /// [`DEFAULT_CHARACTER`] if `baud` is 0.
+///
+/// ```
+/// // 11 bits.
+/// assert_eq!(mbm::time::character(9600), 1146);
+/// ```
 pub const fn character(baud: u32) -> u16 {
     let time = match 11_000_000u32.checked_div(baud) {
         Some(time) => time,
@@ -137,6 +158,12 @@ pub const fn sure_to_be_sending(character: u16, count: u16) -> u32 {
 
 /// The silence t3.5 that separates two frames, in microseconds. [`DEFAULT_SILENCE`] if
 /// `baud` is 0.
+///
+/// ```
+/// assert_eq!(mbm::time::silence(9600), 4011);
+/// // From 19200 baud on, the standard wants a fixed silence.
+/// assert_eq!(mbm::time::silence(115_200), 1750);
+/// ```
 pub const fn silence(baud: u32) -> u32 {
     if baud > 19_200 {
         FAST_SILENCE

@@ -56,6 +56,13 @@ const fn mask(used: u8) -> u16 {
 }
 
 /// A unit that holds packed bits: a data byte, or a word as the master stores them.
+///
+/// ```
+/// use mbm::data::bits::Packed;
+///
+/// assert!(0b100_u8.bit(2));
+/// assert_eq!(0b100_u16.with_bit(0, true), 0b101);
+/// ```
 pub trait Packed: Copy {
     /// Number of bits in it.
     const BITS: usize;
@@ -98,6 +105,14 @@ packed!(u8 u16);
 ///
 /// # Errors
 /// [`Error::BufferTooSmall`] if `units` cannot hold all bits; nothing is packed then.
+///
+/// ```
+/// let mut bytes = [0xFF_u8; 2];
+/// mbm::data::bits::pack(&mut bytes, [true, false, true].into_iter())?;
+/// // The unused bits of the last byte are off, and the byte after it does not change.
+/// assert_eq!(bytes, [0b101, 0xFF]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn pack<T: Packed>(
     units: &mut [T],
     bits: impl ExactSizeIterator<Item = bool>,
@@ -119,6 +134,12 @@ pub fn pack<T: Packed>(
 ///
 /// # Errors
 /// [`Error::IllegalDataAddress`] if `units` holds fewer bits.
+///
+/// ```
+/// let coils: Vec<bool> = mbm::data::bits::unpack(&[0b101_u8], 3)?.collect();
+/// assert_eq!(coils, [true, false, true]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn unpack<T: Packed>(
     units: &[T],
     quantity: usize,
@@ -145,6 +166,14 @@ fn place(first: u16, quantity: u16, address: u16) -> Result<usize, Error> {
 ///
 /// # Errors
 /// [`Error::IllegalDataAddress`] if the coil is not one of these.
+///
+/// ```
+/// // Ten coils from address 20 on, in the words of a master.
+/// let words = [0b10_0000_0001_u16];
+/// assert!(mbm::data::bits::is_set(&words, 20, 10, 29)?);
+/// assert!(mbm::data::bits::is_set(&words, 20, 10, 30).is_err());
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn is_set<T: Packed>(
     units: &[T],
     first: u16,
@@ -162,6 +191,13 @@ pub fn is_set<T: Packed>(
 /// # Errors
 /// [`Error::IllegalDataAddress`] if the coil is not one of these; nothing is changed
 /// then.
+///
+/// ```
+/// let mut words = [0_u16];
+/// mbm::data::bits::set(&mut words, 20, 10, 29, true)?;
+/// assert_eq!(words, [0b10_0000_0000]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn set<T: Packed>(
     units: &mut [T],
     first: u16,

@@ -47,6 +47,16 @@ struct Place {
 }
 
 /// A layout, and whether its numbers are in BCD.
+///
+/// ```
+/// use mbm::data::clock::Layout;
+///
+/// let layout = Layout::new(b"yM Dh ms", false)?;
+/// assert_eq!(layout.registers(), 3);
+/// // There is no such letter.
+/// assert_eq!(Layout::new(b"Q", false).err(), Some(mbm::Error::InvalidArgument));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Layout<'a> {
     text: &'a [u8],
@@ -193,6 +203,17 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::MalformedValue`] for a date that does not exist,
     /// or a digit above 9.
+    ///
+    /// ```
+    /// use mbm::data::clock::Layout;
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let layout = Layout::new(b"Y M D h m s", false)?;
+    /// let response = Registers::new(&[2026_u16, 11, 28, 12, 30, 0][..], 107, Order::Abcd)?;
+    /// let date = response.date(&layout, Order::Abcd, 107)?;
+    /// assert_eq!((date.year, date.month, date.hour), (2026, 11, 12));
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn date(&self, layout: &Layout, order: Order, address: u16) -> Result<Date, Error> {
         let length = 2 * usize::from(layout.registers());
         let _ = self.byte_index(address, length)?;
@@ -223,6 +244,15 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count, or an order
     /// by halves; [`Error::MalformedValue`] for a date that does not exist.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[26_u16, 0x0B1C, 0x0C1E][..], 107, Order::Abcd)?;
+    /// let date = response.iec870_date(Order::Abcd, 107, 3)?;
+    /// assert_eq!((date.year, date.day, date.minute), (2026, 28, 30));
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn iec870_date(&self, order: Order, address: u16, count: u16) -> Result<Date, Error> {
         let [year, days, minutes, milliseconds] = iec870_places(order, count)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
@@ -255,6 +285,19 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for a date that does not
     /// exist; [`Error::OutOfRange`] for one that the registers cannot hold exactly. Nothing is
     /// set then.
+    ///
+    /// ```
+    /// use mbm::data::clock::Layout;
+    /// use mbm::data::date::Date;
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let date = Date { year: 2026, month: 11, day: 28, hour: 12, ..Date::default() };
+    /// let mut words = [0_u16; 2];
+    /// let mut registers = Registers::new(&mut words[..], 107, Order::Abcd)?;
+    /// registers.set_date(&Layout::new(b"yM Dh", false)?, Order::Abcd, 107, &date)?;
+    /// assert_eq!(words, [0x1A0B, 0x1C0C]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_date(
         &mut self,
         layout: &Layout,
@@ -304,6 +347,18 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// As [`Registers::set_date`]; [`Error::InvalidArgument`] also for another count or an order by
     /// halves.
+    ///
+    /// ```
+    /// use mbm::data::date::Date;
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let date = Date { year: 2026, month: 11, day: 28, hour: 12, minute: 30, ..Date::default() };
+    /// let mut words = [0_u16; 3];
+    /// let mut registers = Registers::new(&mut words[..], 107, Order::Abcd)?;
+    /// registers.set_iec870_date(Order::Abcd, 107, 3, &date)?;
+    /// assert_eq!(words, [26, 0x0B1C, 0x0C1E]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_iec870_date(
         &mut self,
         order: Order,

@@ -10,6 +10,17 @@ pub const UNRELIABLE: u8 = 2;
 
 /// A date and a time of day, in the time zone of the device. Month and day may both be 0, with the
 /// year 0: a time of day without a date.
+///
+/// ```
+/// use mbm::data::date::Date;
+///
+/// let date = Date::of_seconds(1_700_000_000)?;
+/// assert_eq!((date.year, date.month, date.day), (2023, 11, 14));
+/// assert_eq!(date.seconds(), Ok(1_700_000_000));
+/// assert!(date.exists());
+/// assert!(!Date { month: 2, day: 30, ..date }.exists());
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Date {

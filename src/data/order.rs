@@ -7,6 +7,16 @@
 ///
 /// The standard defines the byte order of one register, high byte first. It defines no
 /// order for values of several registers, so devices use each of these.
+///
+/// ```
+/// use mbm::data::{Order, Registers};
+///
+/// // The low word comes first.
+/// let response = Registers::new(&[0x8000_u16, 0x4366][..], 0, Order::Cdab)?;
+/// assert_eq!(response.get(0), Ok(230.5_f32));
+/// assert!(Order::Cdab.low_word_first() && !Order::Cdab.swaps_bytes());
+/// # Ok::<(), mbm::Error>(())
+/// ```
 // The number of an order is its mask for eight bytes: 1 swaps the bytes of each register, 2 the
 // registers of each half, 4 the halves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

@@ -12,6 +12,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count, or for an
     /// order by halves of three registers.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x0102_u16, 0x0304][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.raw(Order::Cdab, 107, 2)?, 0x0304_0102);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn raw(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
         check_count(count, 4)?;
         let _ = self.byte_index(address, 2 * usize::from(count))?;
@@ -30,6 +38,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// As [`Registers::raw`]; [`Error::InvalidArgument`] also for no bits, or for bits beyond
     /// those of the registers.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0b0000_0110_1000_0000_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.bits(Order::Abcd, 107, 1, 7, 4)?, 0b1101);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn bits(
         &self,
         order: Order,
@@ -82,6 +98,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// As [`Registers::bits`]; [`Error::OutOfRange`] for a number with more bits. Nothing is set
     /// then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_bits(Order::Abcd, 107, 1, 7, 4, 0b1101)?;
+    /// assert_eq!(words, [0b0000_0110_1000_0000]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_bits(
         &mut self,
         order: Order,

@@ -5,6 +5,13 @@ use super::view::{RegisterBytes, RegisterBytesMut, Registers};
 use crate::error::Error;
 
 /// Which bytes of a register hold characters.
+///
+/// ```
+/// use mbm::data::text::{Characters, TextForm};
+///
+/// let form = TextForm { characters: Characters::Low, has_spaces: false };
+/// assert_eq!(form.registers(8), 8);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Characters {
     /// Two a register, the first as the order says.
@@ -17,6 +24,13 @@ pub enum Characters {
 }
 
 /// A form of text.
+///
+/// ```
+/// use mbm::data::text::TextForm;
+///
+/// // Two characters a register.
+/// assert_eq!(TextForm::default().registers(7), 4);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct TextForm {
     /// Which bytes hold characters.
@@ -51,6 +65,17 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if `buffer` cannot hold the
     /// text. Nothing is copied then.
+    ///
+    /// ```
+    /// use mbm::data::text::{Characters, TextForm};
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// // A character in the low byte of each register, and spaces at the end.
+    /// let form = TextForm { characters: Characters::Low, has_spaces: true };
+    /// let response = Registers::new(&[0x004F_u16, 0x004B, 0x0020][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.text_of(form, Order::Abcd, 107, 3, &mut [0; 3])?, b"OK");
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn text_of<'b>(
         &self,
         form: TextForm,
@@ -84,6 +109,18 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if the text is longer than
     /// the field; [`Error::InvalidArgument`] if the form has spaces and the text ends with one,
     /// which would be lost. Nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::text::{Characters, TextForm};
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let form = TextForm { characters: Characters::Low, has_spaces: true };
+    /// let mut words = [0_u16; 3];
+    /// let mut registers = Registers::new(&mut words[..], 107, Order::Abcd)?;
+    /// registers.set_text_of(form, Order::Abcd, 107, 3, b"OK")?;
+    /// assert_eq!(words, [0x004F, 0x004B, 0x0020]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_text_of(
         &mut self,
         form: TextForm,

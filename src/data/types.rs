@@ -14,6 +14,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count;
     /// [`Error::MalformedValue`] for a digit above 9.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x1234_u16, 0x5678][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.bcd(Order::Abcd, 107, 2)?, 12_345_678);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn bcd(&self, order: Order, address: u16, count: u16) -> Result<u32, Error> {
         check_count(count, 2)?;
         digits::from_bcd(self.raw(order, address, count)? as u32)
@@ -24,6 +32,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::raw`]; [`Error::MalformedValue`] for a register above 9999.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[12_u16, 3456][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.m10k(Order::Abcd, 107, 2)?, 123_456);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn m10k(&self, order: Order, address: u16, count: u16) -> Result<u64, Error> {
         digits::from_m10k(self.raw(order, address, count)?, count)
     }
@@ -32,6 +48,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::m10k`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0xFFF4_u16, 0xF280][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.signed_m10k(Order::Abcd, 107, 2)?, -123_456);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn signed_m10k(&self, order: Order, address: u16, count: u16) -> Result<i64, Error> {
         digits::from_signed_m10k(self.raw(order, address, count)?, count)
     }
@@ -41,6 +65,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x0012_u16, 0x3456][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.u24(Order::Abcd, 107)?, 0x12_3456);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn u24(&self, order: Order, address: u16) -> Result<u32, Error> {
         Ok(self.get_in::<u32>(order, address)? & 0x00FF_FFFF)
     }
@@ -49,6 +81,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x00FF_u16, 0xFFFE][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.i24(Order::Abcd, 107)?, -2);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn i24(&self, order: Order, address: u16) -> Result<i32, Error> {
         Ok((self.get_in::<u32>(order, address)? << 8).cast_signed() >> 8)
     }
@@ -57,6 +97,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for an order by halves.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x0001_u16, 0x0002, 0x0003][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.u48(Order::Abcd, 107)?, 0x1_0002_0003);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn u48(&self, order: Order, address: u16) -> Result<u64, Error> {
         self.raw(order, address, 3)
     }
@@ -65,6 +113,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::u48`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0xFFFF_u16, 0xFFFF, 0xFFFE][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.i48(Order::Abcd, 107)?, -2);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn i48(&self, order: Order, address: u16) -> Result<i64, Error> {
         Ok((self.raw(order, address, 3)? << 16).cast_signed() >> 16)
     }
@@ -74,6 +130,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] for another count.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x8005_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.sign_magnitude(Order::Abcd, 107, 1)?, -5);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn sign_magnitude(&self, order: Order, address: u16, count: u16) -> Result<i32, Error> {
         check_count(count, 2)?;
         let raw = self.raw(order, address, count)? as u32;
@@ -90,6 +154,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x3E00_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.half(Order::Abcd, 107)?, 1.5);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn half(&self, order: Order, address: u16) -> Result<f32, Error> {
         let half: u16 = self.get_in(order, address)?;
         Ok(f32::from_bits(half::to_float(half)))
@@ -101,6 +173,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::bcd`]; [`Error::OutOfRange`] for a number with more digits.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_bcd(Order::Abcd, 107, 2, 12_345_678)?;
+    /// assert_eq!(words, [0x1234, 0x5678]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_bcd(
         &mut self,
         order: Order,
@@ -117,6 +198,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::raw`]; [`Error::OutOfRange`] for a number with more digits.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_m10k(Order::Abcd, 107, 2, 123_456)?;
+    /// assert_eq!(words, [12, 3456]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_m10k(
         &mut self,
         order: Order,
@@ -132,6 +222,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::set_m10k`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_signed_m10k(Order::Abcd, 107, 2, -123_456)?;
+    /// assert_eq!(words, [0xFFF4, 0xF280]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_signed_m10k(
         &mut self,
         order: Order,
@@ -148,6 +247,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::OutOfRange`] for a number with more bits.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_u24(Order::Abcd, 107, 0x12_3456)?;
+    /// assert_eq!(words, [0x0012, 0x3456]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_u24(&mut self, order: Order, address: u16, number: u32) -> Result<(), Error> {
         if number >> 24 != 0 {
             return Err(Error::OutOfRange);
@@ -159,6 +267,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::set_u24`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_i24(Order::Abcd, 107, -2)?;
+    /// assert_eq!(words, [0xFFFF, 0xFFFE]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_i24(&mut self, order: Order, address: u16, number: i32) -> Result<(), Error> {
         if number << 8 >> 8 != number {
             return Err(Error::OutOfRange);
@@ -170,6 +287,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::u48`]; [`Error::OutOfRange`] for a number with more bits.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 3];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_u48(Order::Abcd, 107, 0x1_0002_0003)?;
+    /// assert_eq!(words, [1, 2, 3]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_u48(&mut self, order: Order, address: u16, number: u64) -> Result<(), Error> {
         self.set_raw(order, address, 3, number)
     }
@@ -178,6 +304,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::set_u48`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 3];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_i48(Order::Abcd, 107, -2)?;
+    /// assert_eq!(words, [0xFFFF, 0xFFFF, 0xFFFE]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_i48(&mut self, order: Order, address: u16, number: i64) -> Result<(), Error> {
         if number << 16 >> 16 != number {
             return Err(Error::OutOfRange);
@@ -189,6 +324,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::sign_magnitude`]; [`Error::OutOfRange`] for a number with more bits.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_sign_magnitude(Order::Abcd, 107, 1, -5)?;
+    /// assert_eq!(words, [0x8005]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_sign_magnitude(
         &mut self,
         order: Order,
@@ -215,6 +359,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::OutOfRange`] for a number that would become
     /// infinite, or 0 without being 0.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_half(Order::Abcd, 107, 1.5)?;
+    /// assert_eq!(words, [0x3E00]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_half(&mut self, order: Order, address: u16, number: f32) -> Result<(), Error> {
         self.set_in(order, address, half::from_float(number.to_bits())?)
     }

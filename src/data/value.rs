@@ -1,6 +1,31 @@
 //! Numbers of one, two or four registers. Floats are copied as bits, without arithmetic.
 
 /// A number of one, two or four registers.
+///
+/// ```
+/// use mbm::data::value::Value;
+/// use mbm::data::{Order, Registers};
+///
+/// /// A temperature, of which a device sends tenths of a degree.
+/// #[derive(Clone, Copy, PartialEq, Debug)]
+/// struct Tenths(i16);
+///
+/// impl Value for Tenths {
+///     type Bytes = [u8; 2];
+///
+///     fn from_bytes(bytes: [u8; 2]) -> Self {
+///         Tenths(i16::from_be_bytes(bytes))
+///     }
+///
+///     fn to_bytes(self) -> [u8; 2] {
+///         self.0.to_be_bytes()
+///     }
+/// }
+///
+/// let response = Registers::new(&[215_u16][..], 107, Order::Abcd)?;
+/// assert_eq!(response.get(107), Ok(Tenths(215)));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub trait Value: Copy {
     /// An array of its bytes, the most significant first.
     type Bytes: Copy + Default + AsRef<[u8]> + AsMut<[u8]>;
@@ -32,6 +57,15 @@ values!(u16 i16 u32 i32 u64 i64 f32 f64);
 
 /// An IEEE 754 binary64 in four registers, which the machine holds as a binary32. On an
 /// AVR, `double` in C is such a number.
+///
+/// ```
+/// use mbm::data::value::ShortDouble;
+/// use mbm::data::{Order, Registers};
+///
+/// let response = Registers::new(&[0x3FF8_u16, 0, 0, 0][..], 107, Order::Abcd)?;
+/// assert_eq!(response.get::<ShortDouble>(107)?.0, 1.5);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug)]
 pub struct ShortDouble(pub f32);

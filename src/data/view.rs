@@ -8,6 +8,28 @@ use super::value::Value;
 use crate::error::Error;
 
 /// Consecutive registers, accessed as bytes in the order of the wire.
+///
+/// ```
+/// use mbm::data::view::RegisterBytes;
+/// use mbm::data::{Order, Registers};
+///
+/// /// Registers that a display driver keeps, low byte first.
+/// struct Display([u8; 4]);
+///
+/// impl RegisterBytes for Display {
+///     fn length(&self) -> usize {
+///         self.0.len()
+///     }
+///
+///     fn byte(&self, place: usize) -> Option<u8> {
+///         self.0.get(place ^ 1).copied()
+///     }
+/// }
+///
+/// let display = Registers::new(Display([0x2B, 0x02, 0, 0]), 107, Order::Abcd)?;
+/// assert_eq!(display.get(107), Ok(555_u16));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub trait RegisterBytes {
     /// Number of bytes, two for each register.
     fn length(&self) -> usize;
@@ -17,6 +39,21 @@ pub trait RegisterBytes {
 }
 
 /// Registers that can also be written.
+///
+/// ```
+/// use mbm::data::view::{RegisterBytes, RegisterBytesMut};
+///
+/// /// Sets every byte to 0.
+/// fn clear(mut registers: impl RegisterBytesMut) {
+///     for place in 0..registers.length() {
+///         registers.set_byte(place, 0);
+///     }
+/// }
+///
+/// let mut words = [555_u16, 100];
+/// clear(&mut words[..]);
+/// assert_eq!(words, [0, 0]);
+/// ```
 pub trait RegisterBytesMut: RegisterBytes {
     /// Sets the byte at the index `place`; does nothing past the end.
     fn set_byte(&mut self, place: usize, value: u8);
@@ -86,6 +123,19 @@ impl RegisterBytesMut for &mut [u16] {
 
 /// Typed access to registers: for reading if `C` is [`RegisterBytes`], also for writing if it is
 /// [`RegisterBytesMut`].
+///
+/// ```
+/// use mbm::data::{Order, Registers};
+///
+/// // What a device answered that was read from register 107 on.
+/// let mut words = [0x4366_u16, 0x8000, 0x00FF];
+/// let mut meter = Registers::new(&mut words[..], 107, Order::Abcd)?;
+/// assert_eq!(meter.get(107), Ok(230.5_f32));
+/// assert_eq!(meter.get(109), Ok(255_u16));
+/// meter.set(109, -1_i16)?;
+/// assert_eq!(words[2], 0xFFFF);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Registers<C> {
     cells: C,
@@ -100,6 +150,16 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`] if they go beyond address 65535;
     /// [`Error::InvalidArgument`] if the number of bytes is odd.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// // Bytes in the order of the wire, or words.
+    /// let bytes = Registers::new(&[0x02_u8, 0x2B][..], 107, Order::Abcd)?;
+    /// let words = Registers::new(&[555_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(bytes.get::<u16>(107), words.get(107));
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn new(cells: C, first: u16, order: Order) -> Result<Self, Error> {
         let length = cells.length();
         if !length.is_multiple_of(2) {
@@ -116,6 +176,14 @@ impl<C: RegisterBytes> Registers<C> {
     }
 
     /// These registers, with another order for the calls that have no argument for it.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x8000_u16, 0x4366][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.with_byte_order(Order::Cdab).get(107), Ok(230.5_f32));
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     #[must_use]
     pub fn with_byte_order(self, order: Order) -> Self {
         Registers { order, ..self }
@@ -160,6 +228,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x4366_u16, 0x8000][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.get::<f32>(107)?, 230.5);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn get<T: Value>(&self, address: u16) -> Result<T, Error> {
         self.get_in(self.order, address)
     }
@@ -168,6 +244,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x8000_u16, 0x4366][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.get_in::<f32>(Order::Cdab, 107)?, 230.5);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn get_in<T: Value>(&self, order: Order, address: u16) -> Result<T, Error> {
         let mut bytes = T::Bytes::default();
         let mask = order.mask(bytes.as_ref().len());
@@ -179,6 +263,16 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is copied then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x0102_u16, 0x0304][..], 107, Order::Abcd)?;
+    /// let mut bytes = [0; 3];
+    /// response.bytes(107, &mut bytes)?;
+    /// assert_eq!(bytes, [1, 2, 3]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn bytes(&self, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, 0, bytes)
     }
@@ -189,6 +283,16 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is copied then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x0102_u16, 0x0304][..], 107, Order::Abcd)?;
+    /// let mut bytes = [0; 4];
+    /// response.bytes_in(Order::Badc, 107, &mut bytes)?;
+    /// assert_eq!(bytes, [2, 1, 4, 3]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn bytes_in(&self, order: Order, address: u16, bytes: &mut [u8]) -> Result<(), Error> {
         self.load(address, order.swaps_bytes().into(), bytes)
     }
@@ -197,6 +301,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x12FE_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.u8(107, true)?, 0x12);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn u8(&self, address: u16, high: bool) -> Result<u8, Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         Ok(self.cells.byte(place).unwrap_or(0))
@@ -206,6 +318,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x12FE_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.i8(107, false)?, -2);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn i8(&self, address: u16, high: bool) -> Result<i8, Error> {
         self.u8(address, high).map(u8::cast_signed)
     }
@@ -215,6 +335,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] if `bit` is greater
     /// than 15.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0b0100_u16][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.bit(107, 2)?, true);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn bit(&self, address: u16, bit: u8) -> Result<bool, Error> {
         let (high, mask) = byte_of_bit(bit)?;
         Ok(self.u8(address, high)? & mask != 0)
@@ -227,6 +355,14 @@ impl<C: RegisterBytes> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if `buffer` cannot
     /// hold the text. Nothing is copied then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x6D62_u16, 0x6D00][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.text(107, 4, &mut [0; 4])?, b"mbm");
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn text<'b>(
         &self,
         address: u16,
@@ -240,6 +376,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::text`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x626D_u16, 0x006D][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.text_in(Order::Badc, 107, 4, &mut [0; 4])?, b"mbm");
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn text_in<'b>(
         &self,
         order: Order,
@@ -265,6 +409,14 @@ impl<C: RegisterBytes> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let response = Registers::new(&[0x6D62_u16, 0x6D00][..], 107, Order::Abcd)?;
+    /// assert_eq!(response.is_equal(107, b"mbm")?, true);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn is_equal(&self, address: u16, bytes: &[u8]) -> Result<bool, Error> {
         let start = self.byte_index(address, bytes.len())?;
         let mut held = bytes.iter().enumerate();
@@ -298,6 +450,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set(107, 230.5_f32)?;
+    /// assert_eq!(words, [0x4366, 0x8000]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set<T: Value>(&mut self, address: u16, value: T) -> Result<(), Error> {
         self.set_in(self.order, address, value)
     }
@@ -306,6 +467,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_in(Order::Cdab, 107, 230.5_f32)?;
+    /// assert_eq!(words, [0x8000, 0x4366]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_in<T: Value>(&mut self, order: Order, address: u16, value: T) -> Result<(), Error> {
         let bytes = value.to_bytes();
         let mask = order.mask(bytes.as_ref().len());
@@ -317,6 +487,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_bytes(107, b"mbm")?;
+    /// assert_eq!(words, [0x6D62, 0x6D00]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_bytes(&mut self, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, 0, bytes)
     }
@@ -325,6 +504,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]; nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_bytes_in(Order::Badc, 107, b"mbm")?;
+    /// assert_eq!(words, [0x626D, 0x006D]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_bytes_in(&mut self, order: Order, address: u16, bytes: &[u8]) -> Result<(), Error> {
         self.store(address, order.swaps_bytes().into(), bytes)
     }
@@ -333,6 +521,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_u8(107, true, 0x12)?;
+    /// assert_eq!(words, [0x1200]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_u8(&mut self, address: u16, high: bool, value: u8) -> Result<(), Error> {
         let place = self.byte_index(address, 2)? + usize::from(!high);
         self.cells.set_byte(place, value);
@@ -343,6 +540,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// [`Error::IllegalDataAddress`]
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_i8(107, false, -2)?;
+    /// assert_eq!(words, [0x00FE]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_i8(&mut self, address: u16, high: bool, value: i8) -> Result<(), Error> {
         self.set_u8(address, high, value.cast_unsigned())
     }
@@ -353,6 +559,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::InvalidArgument`] if `bit` is greater
     /// than 15.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 1];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_bit(107, 2, true)?;
+    /// assert_eq!(words, [0b0100]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_bit(&mut self, address: u16, bit: u8, on: bool) -> Result<(), Error> {
         let (high, mask) = byte_of_bit(bit)?;
         let others = self.u8(address, high)? & !mask;
@@ -366,6 +581,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     /// # Errors
     /// [`Error::IllegalDataAddress`]; [`Error::BufferTooSmall`] if the text is longer
     /// than the field. Nothing is set then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_text(107, 4, b"mbm")?;
+    /// assert_eq!(words, [0x6D62, 0x6D00]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_text(&mut self, address: u16, length: usize, text: &[u8]) -> Result<(), Error> {
         self.set_text_in(self.order, address, length, text)
     }
@@ -374,6 +598,15 @@ impl<C: RegisterBytesMut> Registers<C> {
     ///
     /// # Errors
     /// As [`Registers::set_text`].
+    ///
+    /// ```
+    /// use mbm::data::{Order, Registers};
+    ///
+    /// let mut words = [0_u16; 2];
+    /// Registers::new(&mut words[..], 107, Order::Abcd)?.set_text_in(Order::Badc, 107, 4, b"mbm")?;
+    /// assert_eq!(words, [0x626D, 0x006D]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn set_text_in(
         &mut self,
         order: Order,

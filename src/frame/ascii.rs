@@ -158,6 +158,15 @@ pub fn decode(bytes: &mut [u8], end: u8, in_place: bool) -> Decoded {
 /// [`Error::IncompleteFrame`] if the end is missing; [`Error::MalformedFrame`] if the colon
 /// is missing, or if the characters are not pairs of digits; [`Error::InvalidCrc`] if the LRC
 /// is wrong. After an error, `bytes` may be overwritten.
+///
+/// ```
+/// use mbm::frame::ascii;
+///
+/// let mut frame = *b":114107A7\r\n";
+/// let adu = ascii::parse(&mut frame, ascii::END)?;
+/// assert_eq!((adu.unit, adu.pdu), (17, &[0x41, 7][..]));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
     if bytes.first().is_none_or(|first| *first == START)
         && bytes.len() <= MAX_FRAME
@@ -185,6 +194,18 @@ pub fn parse(bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
 ///
 /// # Errors
 /// The error of `pdu`; [`Error::BufferTooSmall`].
+///
+/// ```
+/// use mbm::frame::ascii;
+///
+/// let mut buffer = [0; 11];
+/// let emitted = ascii::emit(&mut buffer, 17, ascii::END, |pdu| {
+///     pdu[..2].copy_from_slice(&[0x41, 7]);
+///     Ok(2)
+/// });
+/// assert_eq!(emitted, Ok(11));
+/// assert_eq!(buffer, *b":114107A7\r\n");
+/// ```
 pub fn emit(
     buffer: &mut [u8],
     unit: u8,

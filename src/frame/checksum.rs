@@ -50,6 +50,15 @@ fn by_parity(crc: u16, bytes: &[u8]) -> u16 {
 }
 
 /// A CRC-16 that can be updated as bytes arrive.
+///
+/// ```
+/// use mbm::frame::checksum::{crc16, Crc16};
+///
+/// // Byte by byte, as they arrive.
+/// let crc = Crc16::START.with(&[17, 6, 0x00]).with(&[0x6D, 0x03, 0x78]);
+/// assert_eq!(crc, crc16(&[17, 6, 0x00, 0x6D, 0x03, 0x78]));
+/// assert_eq!(crc.to_bytes(), [0x1A, 0x55]);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Crc16(u16);
 
@@ -106,11 +115,20 @@ impl Crc16 {
 }
 
 /// The CRC-16 of `bytes`.
+///
+/// ```
+/// let crc = mbm::frame::checksum::crc16(&[17, 6, 0x00, 0x6D, 0x03, 0x78]);
+/// assert_eq!(crc.to_bytes(), [0x1A, 0x55]);
+/// ```
 pub fn crc16(bytes: &[u8]) -> Crc16 {
     Crc16::START.with(bytes)
 }
 
 /// The LRC of `bytes`: the sum of `bytes` and the LRC is 0 modulo 256.
+///
+/// ```
+/// assert_eq!(mbm::frame::checksum::lrc(&[17, 6, 0x00, 0x6D, 0x03, 0x78]), 0x01);
+/// ```
 pub fn lrc(bytes: &[u8]) -> u8 {
     let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
     sum.wrapping_neg()

@@ -10,6 +10,23 @@ pub use rtu::Adu;
 use crate::error::Error;
 
 /// The framing: how frames are encoded and separated.
+///
+/// ```
+/// use mbm::frame::{ascii, Framing};
+///
+/// let mut buffer = [0; Framing::Ascii.max_frame()];
+/// let emitted = Framing::Ascii.emit(&mut buffer, 0, 17, ascii::END, |pdu| {
+///     pdu[..2].copy_from_slice(&[0x41, 7]);
+///     Ok(2)
+/// });
+/// assert_eq!(emitted, Ok(11));
+/// assert_eq!(buffer[..11], *b":114107A7\r\n");
+///
+/// let adu = Framing::Ascii.parse(&mut buffer[..11], ascii::END)?;
+/// assert_eq!((adu.unit, adu.pdu), (17, &[0x41, 7][..]));
+/// assert!(Framing::Ascii.is_serial());
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Framing {
@@ -70,6 +87,16 @@ impl Framing {
     ///
     /// # Errors
     /// As [`Framing::parse`].
+    ///
+    /// ```
+    /// use mbm::frame::{ascii, Framing};
+    ///
+    /// // The CRC of this frame would be 5D F0.
+    /// let mut frame = [17, 0x41, 7, 0, 0];
+    /// assert_eq!(Framing::Rtu.parse(&mut frame, ascii::END), Err(mbm::Error::InvalidCrc));
+    /// assert_eq!(Framing::Rtu.parse_without_crc(&mut frame, ascii::END)?.pdu, [0x41, 7]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn parse_without_crc(self, bytes: &mut [u8], end: u8) -> Result<Adu<'_>, Error> {
         match self {
             Framing::Rtu | Framing::RtuOverTcp => rtu::parse_without_crc(bytes),

@@ -17,6 +17,14 @@ pub const HEADER: usize = 6;
 const VALID_LENGTHS: RangeInclusive<u16> = 2..=(MAX_FRAME - HEADER) as u16;
 
 /// The MBAP header.
+///
+/// ```
+/// use mbm::frame::tcp::{header, Header};
+///
+/// let first = [0, 5, 0, 0, 0, 6, 17, 6];
+/// assert_eq!(header(&first)?, Header { transaction: 5, total: 12, unit: 17 });
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Header {
     /// The transaction identifier. A response repeats that of its request.
@@ -33,6 +41,17 @@ pub struct Header {
 /// # Errors
 /// [`Error::IncompleteFrame`] if bytes of the header are missing;
 /// [`Error::MalformedFrame`] if the bytes cannot begin a Modbus TCP frame.
+///
+/// ```
+/// use mbm::frame::tcp;
+/// use mbm::Error;
+///
+/// // How many bytes to read until the frame is whole.
+/// assert_eq!(tcp::header(&[0, 5, 0, 0, 0, 6, 17])?.total, 12);
+/// assert_eq!(tcp::header(&[0, 5, 0]), Err(Error::IncompleteFrame));
+/// assert_eq!(tcp::header(&[0, 5, 0, 1]), Err(Error::MalformedFrame));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn header(bytes: &[u8]) -> Result<Header, Error> {
     let Some([a, b, c, d, e, f, unit]) = bytes.first_chunk() else {
         return Err(partial_header_error(bytes));
@@ -84,6 +103,14 @@ fn partial_header_error(bytes: &[u8]) -> Error {
 /// # Errors
 /// As [`header`]; [`Error::IncompleteFrame`] also if bytes of the PDU are missing;
 /// [`Error::MalformedFrame`] also if bytes follow the frame.
+///
+/// ```
+/// use mbm::frame::tcp;
+///
+/// let adu = tcp::parse(&[0, 5, 0, 0, 0, 6, 17, 6, 0x00, 0x6D, 0x03, 0x78])?;
+/// assert_eq!((adu.transaction, adu.unit, adu.pdu[0]), (5, 17, 6));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn parse(bytes: &[u8]) -> Result<Adu<'_>, Error> {
     let Some(([a, b, protocol_and_length @ .., unit], pdu)) = bytes.split_first_chunk::<PDU>()
     else {
@@ -116,6 +143,18 @@ fn parse_error(bytes: &[u8]) -> Error {
 ///
 /// # Errors
 /// The error of `pdu`; [`Error::BufferTooSmall`].
+///
+/// ```
+/// use mbm::frame::tcp;
+///
+/// let mut buffer = [0; tcp::MAX_FRAME];
+/// let length = tcp::emit(&mut buffer, 5, 17, |pdu| {
+///     pdu[..2].copy_from_slice(&[0x41, 7]);
+///     Ok(2)
+/// })?;
+/// assert_eq!(buffer[..length], [0, 5, 0, 0, 0, 3, 17, 0x41, 7]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn emit(
     buffer: &mut [u8],
     transaction: u16,

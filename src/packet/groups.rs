@@ -17,6 +17,16 @@ const NO_RECORD: Record = Record {
 /// Reads the first record in the data of function 14 or 15. Returns the record, its data, and
 /// the length of the group in bytes. The data are empty in a request of 14. In a response of
 /// 14 only the length of the record is known.
+///
+/// ```
+/// use mbm::packet::{groups, PduKind};
+///
+/// let data = [6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 1];
+/// let (first, _, length) = groups::record(PduKind::Request, 0x14, &data).unwrap();
+/// assert_eq!((first.file, first.record, first.length), (4, 1, 2));
+/// let (second, ..) = groups::record(PduKind::Request, 0x14, &data[length..]).unwrap();
+/// assert_eq!(second.file, 3);
+/// ```
 pub fn record(side: PduKind, function: u8, groups: &[u8]) -> Option<(Record, &[u8], usize)> {
     match (function, side) {
         (READ_FILE_RECORD, PduKind::Request) => {
@@ -50,6 +60,17 @@ pub fn record(side: PduKind, function: u8, groups: &[u8]) -> Option<(Record, &[u
 /// [`Error::IllegalFunction`] for functions other than 14 and 15;
 /// [`Error::BufferTooSmall`]; the error of a request or response that contains only this
 /// record.
+///
+/// ```
+/// use mbm::packet::{groups, PduKind};
+/// use mbm::pdu::files::Record;
+///
+/// let record = Record { file: 4, record: 1, length: 2 };
+/// let mut data = [0; 7];
+/// groups::put_record(PduKind::Request, 0x14, record, &[], &mut data)?;
+/// assert_eq!(data, [6, 0, 4, 0, 1, 0, 2]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn put_record(
     side: PduKind,
     function: u8,
@@ -85,6 +106,10 @@ pub fn put_record(
 
 /// Reads the first object in a device identification. Returns its id, its value, and the
 /// length of the group in bytes.
+///
+/// ```
+/// assert_eq!(mbm::packet::groups::object(b"\0\x03mbm"), Some((0, &b"mbm"[..], 5)));
+/// ```
 pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
     let mut reader = Reader::new(groups);
     let (id, length) = (reader.u8()?, usize::from(reader.u8()?));
@@ -97,6 +122,13 @@ pub fn object(groups: &[u8]) -> Option<(u8, &[u8], usize)> {
 /// # Errors
 /// [`Error::IllegalDataValue`] if the value is longer than 255 bytes;
 /// [`Error::BufferTooSmall`].
+///
+/// ```
+/// let mut data = [0; 5];
+/// mbm::packet::groups::put_object(0, b"mbm", &mut data)?;
+/// assert_eq!(data, *b"\0\x03mbm");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn put_object(id: u8, value: &[u8], place: &mut [u8]) -> Result<usize, Error> {
     if value.len() > 0xFF {
         return Err(Error::IllegalDataValue);

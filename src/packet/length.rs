@@ -46,6 +46,16 @@ fn may_be_longer(side: PduKind, pdu: &[u8]) -> bool {
 /// # Errors
 /// [`Error::MalformedFrame`] if no frame of this framing begins with these bytes, or if the
 /// frame would be too long for this framing.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::{length, PduKind};
+/// use mbm::pdu::length::Length;
+///
+/// let known = |bytes| length::expected(Framing::Rtu, PduKind::Response, bytes, END, &[]);
+/// assert_eq!(known(&[17, 3]), Ok(Length::AtLeast(5)));
+/// assert_eq!(known(&[17, 3, 4]), Ok(Length::Exactly(9)));
+/// ```
 pub fn expected(
     framing: Framing,
     side: PduKind,
@@ -82,6 +92,14 @@ pub fn expected(
 
 /// The function code of the frame that begins with these bytes; `None` if they do not contain
 /// it yet.
+///
+/// ```
+/// use mbm::frame::Framing;
+/// use mbm::packet::length;
+///
+/// assert_eq!(length::function(Framing::Rtu, &[17, 3]), Some(3));
+/// assert_eq!(length::function(Framing::Tcp, &[17, 3]), None);
+/// ```
 pub fn function(framing: Framing, bytes: &[u8]) -> Option<u8> {
     match framing {
         Framing::Rtu | Framing::RtuOverTcp => bytes.get(rtu::PDU).copied(),
@@ -145,6 +163,16 @@ fn expected_ascii(
 /// The length of the frame that answers a request, if the request succeeds. (The answer may
 /// be an exception instead, whose PDU has two bytes.) [`Length::Exactly`] of 0 if a request
 /// is never answered: a broadcast, or Force Listen Only Mode.
+///
+/// ```
+/// use mbm::frame::Framing;
+/// use mbm::packet::length;
+/// use mbm::pdu::length::Length;
+/// use mbm::pdu::request::Request;
+///
+/// let request = Request::ReadRegisters { function: 3, address: 107, quantity: 2 };
+/// assert_eq!(length::of_reply(Framing::Rtu, 17, &request, &[]), Length::Exactly(9));
+/// ```
 pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Function]) -> Length {
     if framing.is_serial() && unit == 0 {
         return Length::Exactly(0);
@@ -163,6 +191,16 @@ pub fn of_reply(framing: Framing, unit: u8, request: &Request, functions: &[Func
 /// # Errors
 /// [`Error::IncompleteFrame`] if header and function code are not complete;
 /// [`Error::MalformedFrame`] if no such frame begins with these bytes.
+///
+/// ```
+/// use mbm::packet::length::looks_like_tcp;
+///
+/// let frame = [0, 5, 0, 0, 0, 6, 17, 3, 0, 107, 0, 2];
+/// assert_eq!(looks_like_tcp(&frame, false, &[]), Ok(12));
+/// // A request of 03 is not longer.
+/// let other = [0, 5, 0, 0, 0, 7, 17, 3, 0, 107, 0, 2, 0];
+/// assert_eq!(looks_like_tcp(&other, false, &[]), Err(mbm::Error::MalformedFrame));
+/// ```
 pub fn looks_like_tcp(
     bytes: &[u8],
     allow_unknown: bool,

@@ -13,6 +13,14 @@ use crate::pdu::request::Request;
 use crate::pdu::response::Response;
 
 /// The kind of a PDU.
+///
+/// ```
+/// use mbm::packet::PduKind;
+/// use mbm::pdu::length::Length;
+///
+/// assert_eq!(PduKind::Request.length(&[3], &[]), Length::Exactly(5));
+/// assert_eq!(PduKind::Response.length(&[3, 4], &[]), Length::Exactly(6));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PduKind {
     /// Sent by a master or client.
@@ -36,6 +44,20 @@ impl PduKind {
 ///
 /// # Errors
 /// Those of [`Request::emit`] and [`Request::parse_with`].
+///
+/// ```
+/// use mbm::packet::emit_request;
+/// use mbm::pdu::custom::{Function, Rule};
+/// use mbm::pdu::request::Request;
+///
+/// let function = Function { code: 0x41, request: Rule::Fixed(2), response: Rule::Silence };
+/// let mut pdu = [0; 5];
+/// let request = Request::Custom { function: 0x41, data: &[7] };
+/// assert_eq!(emit_request(&request, &[function], &mut pdu), Ok(2));
+/// // Two bytes were declared, not three.
+/// let request = Request::Custom { function: 0x41, data: &[7, 7] };
+/// assert!(emit_request(&request, &[function], &mut pdu).is_err());
+/// ```
 pub fn emit_request(
     request: &Request,
     functions: &[Function],
@@ -53,6 +75,16 @@ pub fn emit_request(
 ///
 /// # Errors
 /// Those of [`Response::emit`] and [`Response::parse_with`].
+///
+/// ```
+/// use mbm::packet::emit_response;
+/// use mbm::pdu::response::Response;
+///
+/// let mut pdu = [0; 2];
+/// let response = Response::Exception { function: 3, code: 2 };
+/// assert_eq!(emit_response(&response, &[], &mut pdu), Ok(2));
+/// assert_eq!(pdu, [0x83, 2]);
+/// ```
 pub fn emit_response(
     response: &Response,
     functions: &[Function],

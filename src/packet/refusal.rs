@@ -9,6 +9,15 @@ use crate::pdu::response::Response;
 use crate::pdu::EXCEPTION;
 
 /// The head of a request.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::refusal::{request, Head};
+///
+/// let mut frame = [0, 5, 0, 0, 0, 6, 17, 6, 0x00, 0x6D, 0x03, 0x78];
+/// let (head, _) = request(Framing::Tcp, &mut frame, END, &[]).unwrap();
+/// assert_eq!(head, Head { transaction: 5, unit: 17, function: 6 });
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Head {
     /// The transaction identifier of a TCP frame; 0 in other frames.
@@ -20,6 +29,22 @@ pub struct Head {
 }
 
 /// The exception frame that answers a request.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::refusal::{Exception, Head};
+/// use mbm::Status;
+///
+/// let head = Head { transaction: 5, unit: 17, function: 3 };
+/// let exception = Exception::new(Framing::Tcp, head, Status::ILLEGAL_DATA_ADDRESS)?;
+/// let mut frame = [0; 9];
+/// exception.emit(Framing::Tcp, END, &mut frame)?;
+/// assert_eq!(frame, [0, 5, 0, 0, 0, 3, 17, 0x83, 2]);
+///
+/// let received = Exception::parse(Framing::Tcp, &mut frame, END)?;
+/// assert_eq!((received.head(), received.code()), (head, 2));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Exception {
     head: Head,
@@ -100,6 +125,16 @@ impl Exception {
 }
 
 /// A request frame that is refused.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::refusal::{request, Refusal};
+/// use mbm::Status;
+///
+/// // The CRC is wrong, so nothing answers.
+/// let refusal = request(Framing::Rtu, &mut [17, 3, 0, 107, 0, 2, 0, 0], END, &[]).unwrap_err();
+/// assert_eq!(refusal, Refusal { status: Status::INVALID_CRC, head: None, exception: None });
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal {
     /// The error of the frame, or the exception code for the request.
@@ -116,6 +151,16 @@ pub struct Refusal {
 ///
 /// # Errors
 /// The error, with the exception that answers the request if there is one.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::refusal::request;
+///
+/// // 126 registers are one too many.
+/// let mut frame = [0, 5, 0, 0, 0, 6, 17, 3, 0, 107, 0, 126];
+/// let refusal = request(Framing::Tcp, &mut frame, END, &[]).unwrap_err();
+/// assert_eq!(refusal.exception.map(|exception| exception.code()), Some(3));
+/// ```
 pub fn request<'a>(
     framing: Framing,
     bytes: &'a mut [u8],

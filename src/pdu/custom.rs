@@ -3,6 +3,16 @@
 use super::{is_public, EXCEPTION};
 
 /// The length of a PDU of a user-defined function.
+///
+/// ```
+/// use mbm::pdu::custom::{Function, Rule};
+/// use mbm::pdu::length::{response, Length};
+///
+/// // The byte after the function code counts those after it, and one byte more follows.
+/// let rule = Rule::Counted(1, 1);
+/// let function = Function { code: 0x41, request: Rule::Fixed(2), response: rule };
+/// assert_eq!(response(&[0x41, 4], &[function]), Length::Exactly(7));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Rule {
     /// This number of bytes, including the function code.
@@ -16,6 +26,18 @@ pub enum Rule {
 }
 
 /// A user-defined function: its code and the lengths of its PDUs.
+///
+/// ```
+/// use mbm::pdu::custom::{Function, Rule};
+/// use mbm::pdu::request::Request;
+///
+/// let function = Function { code: 0x41, request: Rule::Fixed(2), response: Rule::Silence };
+/// let request = Request::parse_with(&[0x41, 7], &[function])?;
+/// assert_eq!(request, Request::Custom { function: 0x41, data: &[7] });
+/// // One byte too many.
+/// assert!(Request::parse_with(&[0x41, 7, 7], &[function]).is_err());
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Function {
     /// The function code, 1 to 127. A code of the standard keeps the meaning of the standard.
@@ -27,6 +49,11 @@ pub struct Function {
 }
 
 /// True for the function codes that the standard leaves to users (clause 5).
+///
+/// ```
+/// assert!(mbm::pdu::custom::is_user_defined(65));
+/// assert!(!mbm::pdu::custom::is_user_defined(3));
+/// ```
 pub const fn is_user_defined(function: u8) -> bool {
     matches!(function, 65..=72 | 100..=110)
 }

@@ -12,6 +12,15 @@ pub const REFERENCE_TYPE: u8 = 6;
 pub const GROUP: usize = REFERENCE_TYPE as usize;
 
 /// The records of a file that a sub-request reads or writes.
+///
+/// ```
+/// use mbm::pdu::files::{Reads, Record};
+///
+/// // Reference type 6, file 4, two records from 1 on.
+/// let reads = Reads::new(&[6, 0, 4, 0, 1, 0, 2])?;
+/// assert!(reads.iter().eq([Record { file: 4, record: 1, length: 2 }]));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Record {
     /// File number, from 1 on.
@@ -23,14 +32,46 @@ pub struct Record {
 }
 
 /// The sub-requests of 14.
+///
+/// ```
+/// use mbm::pdu::files::Reads;
+///
+/// let reads = Reads::new(&[6, 0, 4, 0, 1, 0, 2, 6, 0, 3, 0, 9, 0, 1])?;
+/// assert!(reads.iter().map(|record| record.file).eq([4, 3]));
+/// assert_eq!(reads.bytes().len(), 14);
+/// // Function code, byte count, and for each its length, reference type and data.
+/// assert_eq!(reads.response_length(), 2 + 6 + 4);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reads<'a>(pub(super) &'a [u8]);
 
 /// The sub-requests of 15, and of its response.
+///
+/// ```
+/// use mbm::pdu::files::Writes;
+///
+/// let writes = Writes::new(&[6, 0, 4, 0, 7, 0, 1, 0x02, 0x2B])?;
+/// for (record, data) in writes.iter() {
+///     assert_eq!((record.file, record.record, data), (4, 7, &[0x02, 0x2B][..]));
+/// }
+/// assert_eq!(writes.bytes().len(), 9);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Writes<'a>(pub(super) &'a [u8]);
 
 /// The sub-responses of 14.
+///
+/// ```
+/// use mbm::pdu::files::Records;
+///
+/// // Three bytes: the reference type, and one record.
+/// let records = Records::new(&[3, 6, 0x02, 0x2B])?;
+/// assert!(records.iter().eq([[0x02, 0x2B]]));
+/// assert_eq!(records.bytes(), [3, 6, 0x02, 0x2B]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Records<'a>(pub(super) &'a [u8]);
 

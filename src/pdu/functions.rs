@@ -9,6 +9,13 @@ use super::custom::is_user_defined;
 use super::custom::Rule::{self, Counted, Fixed};
 
 /// What a function does to the data of a device.
+///
+/// ```
+/// use mbm::pdu::functions::{direction, Direction};
+///
+/// assert_eq!(direction(3), Direction::Reads);
+/// assert_eq!(direction(6), Direction::Writes);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Direction {
     /// It changes nothing.
@@ -33,11 +40,21 @@ macro_rules! functions {
         pub const FIELDS: &[(u8, &str, &str)] = &[$(($constant, $request_fields, $response_fields)),*];
 
         /// True for the function codes that the standard defines.
+        ///
+        /// ```
+        /// assert!(mbm::pdu::is_public(3));
+        /// assert!(!mbm::pdu::is_public(65));
+        /// ```
         pub const fn is_public(function: u8) -> bool {
             matches!(function, $($constant)|*)
         }
 
         /// The name of a function.
+        ///
+        /// ```
+        /// assert_eq!(mbm::pdu::functions::name(3), "read holding registers");
+        /// assert_eq!(mbm::pdu::functions::name(65), "user-defined function");
+        /// ```
         pub const fn name(function: u8) -> &'static str {
             match function {
                 $($constant => $name,)*
@@ -48,6 +65,12 @@ macro_rules! functions {
 
         /// The length of the request; `None` for an unknown function, and for one with a rule of its
         /// own.
+        ///
+        /// ```
+        /// use mbm::pdu::custom::Rule;
+        ///
+        /// assert_eq!(mbm::pdu::functions::request(3), Some(Rule::Fixed(5)));
+        /// ```
         pub const fn request(function: u8) -> Option<Rule> {
             match function {
                 $($constant => $request,)*
@@ -56,6 +79,12 @@ macro_rules! functions {
         }
 
         /// The length of the response, as [`request`].
+        ///
+        /// ```
+        /// use mbm::pdu::custom::Rule;
+        ///
+        /// assert_eq!(mbm::pdu::functions::response(3), Some(Rule::Counted(1, 0)));
+        /// ```
         pub const fn response(function: u8) -> Option<Rule> {
             match function {
                 $($constant => $response,)*
@@ -75,6 +104,14 @@ macro_rules! functions {
         }
 
         /// The direction of a function's data. [`Direction::Either`] for an unknown function.
+        ///
+        /// ```
+        /// use mbm::pdu::functions::{direction, Direction};
+        ///
+        /// assert_eq!(direction(3), Direction::Reads);
+        /// // It writes, then reads.
+        /// assert_eq!(direction(0x17), Direction::Either);
+        /// ```
         pub const fn direction(function: u8) -> Direction {
             match function {
                 $($constant => Direction::$direction,)*
@@ -186,6 +223,15 @@ functions! {
 /// The first address and the quantity in the request that begins with `head`: for 17 (hex)
 /// those to read; for a function that writes one register or coil the quantity is 1. `None` if
 /// the function has none, or if `head` ends before.
+///
+/// ```
+/// use mbm::pdu::functions::range;
+///
+/// // Reads two registers from 107 on.
+/// assert_eq!(range(&[3, 0, 107, 0, 2]), (Some(107), Some(2)));
+/// // Writes one.
+/// assert_eq!(range(&[6, 0, 107, 0, 2]), (Some(107), Some(1)));
+/// ```
 pub fn range(head: &[u8]) -> (Option<u16>, Option<u16>) {
     let Some((function, body)) = head.split_first() else {
         return (None, None);
@@ -218,6 +264,16 @@ pub const fn coil_value(on: bool) -> u16 {
 }
 
 /// How the request and the response of a function are composed: flags and small numbers.
+///
+/// ```
+/// use mbm::client::RequestState;
+/// use mbm::pdu::functions::FunctionSpec;
+/// use mbm::Status;
+///
+/// let mut state = RequestState::NONE;
+/// assert_eq!(state.set(FunctionSpec::READ_HOLDING_REGISTERS, 107, 2), Status::OK);
+/// assert_eq!(state.set(FunctionSpec::of(3), 107, 126), Status::ILLEGAL_DATA_VALUE);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct FunctionSpec(pub(crate) u32);

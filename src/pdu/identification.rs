@@ -39,6 +39,16 @@ pub enum DeviceIdCode {
 }
 
 /// The fields of a response to Read Device Identification after its code.
+///
+/// ```
+/// use mbm::pdu::identification::{IdentificationReply, BASIC};
+///
+/// // Conformity level, no more follows, no next object, one object: the vendor.
+/// let reply = IdentificationReply::parse(BASIC, b"\x01\0\0\x01\0\x03mbm")?;
+/// assert!(!reply.more_follows);
+/// assert!(reply.objects.iter().eq([(0, &b"mbm"[..])]));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdentificationReply<'a> {
     /// The conformity level, not checked.
@@ -90,6 +100,15 @@ fn read_reply<'a>(code: u8, reader: &mut Reader<'a>) -> Result<IdentificationRep
 }
 
 /// The objects of a response, each an id and a value.
+///
+/// ```
+/// use mbm::pdu::identification::ObjectList;
+///
+/// let objects = ObjectList::new(2, b"\0\x03mbm\x02\x011")?;
+/// assert_eq!((objects.count(), objects.bytes().len()), (2, 8));
+/// assert!(objects.iter().eq([(0, &b"mbm"[..]), (2, b"1")]));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ObjectList<'a> {
     pub(super) count: u8,

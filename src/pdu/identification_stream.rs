@@ -5,6 +5,16 @@ use super::identification::{IdentificationReply, INDIVIDUAL};
 use crate::error::Error;
 
 /// The request that follows a reply.
+///
+/// ```
+/// use mbm::pdu::identification::{IdentificationReply, BASIC};
+/// use mbm::pdu::identification_stream::{Next, ObjectStream};
+///
+/// // More follows, but the device names the object again that it has sent.
+/// let reply = IdentificationReply::parse(BASIC, b"\x01\xFF\0\x01\0\x03mbm")?;
+/// assert_eq!(ObjectStream::new(BASIC, 0).take(&reply), Ok(Next::Stuck));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
     /// Nothing: all objects were read.
@@ -17,6 +27,18 @@ pub enum Next {
 }
 
 /// The state of reading the objects of one device.
+///
+/// ```
+/// use mbm::pdu::identification::{IdentificationReply, BASIC};
+/// use mbm::pdu::identification_stream::{Next, ObjectStream};
+///
+/// let mut stream = ObjectStream::new(BASIC, 0);
+/// let first = IdentificationReply::parse(stream.code(), b"\x01\xFF\x01\x01\0\x03mbm")?;
+/// assert_eq!(stream.take(&first), Ok(Next::Request(1)));
+/// let last = IdentificationReply::parse(stream.code(), b"\x01\0\0\x01\x01\x011")?;
+/// assert_eq!(stream.take(&last), Ok(Next::End));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ObjectStream {

@@ -7,6 +7,15 @@ use super::{functions, EXCEPTION};
 use crate::error::Error;
 
 /// The length of a PDU or frame.
+///
+/// ```
+/// use mbm::pdu::length::{request, Length};
+///
+/// // The byte count of 10 is the sixth byte.
+/// assert_eq!(request(&[0x10, 0, 107], &[]), Length::AtLeast(6));
+/// assert_eq!(request(&[0x10, 0, 107, 0, 2, 4], &[]), Length::Exactly(10));
+/// assert_eq!(request(&[0x65], &[]), Length::Unknown);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Length {
     /// This number of bytes. It may be greater than [`MAX_PDU`](super::MAX_PDU) if the
@@ -49,6 +58,12 @@ fn diagnostics(pdu: &[u8]) -> Length {
 }
 
 /// The length of the request PDU that begins with these bytes.
+///
+/// ```
+/// use mbm::pdu::length::{request, Length};
+///
+/// assert_eq!(request(&[3], &[]), Length::Exactly(5));
+/// ```
 pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
     let Some(&code) = pdu.first() else {
         return Length::AtLeast(1);
@@ -70,6 +85,13 @@ pub fn request(pdu: &[u8], functions: &[Function]) -> Length {
 /// The length of the response PDU that begins with these bytes. For Report Server ID, it is
 /// the length by its byte count. The PDU may be longer, because in some devices the byte count
 /// covers only the id, and more bytes follow.
+///
+/// ```
+/// use mbm::pdu::length::{response, Length};
+///
+/// assert_eq!(response(&[3], &[]), Length::AtLeast(2));
+/// assert_eq!(response(&[3, 4], &[]), Length::Exactly(6));
+/// ```
 pub fn response(pdu: &[u8], functions: &[Function]) -> Length {
     let Some(&code) = pdu.first() else {
         return Length::AtLeast(1);

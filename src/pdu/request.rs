@@ -18,6 +18,24 @@ use core::mem::discriminant;
 
 /// A request PDU. Register data are in the order of the wire, high byte first. The first bit
 /// of bit data is the lowest bit of the first byte.
+///
+/// ```
+/// use mbm::pdu::length::Length;
+/// use mbm::pdu::request::Request;
+///
+/// let request = Request::ReadRegisters { function: 3, address: 107, quantity: 2 };
+/// let mut pdu = [0; 5];
+/// request.emit(&mut pdu)?;
+/// assert_eq!(pdu, [3, 0, 107, 0, 2]);
+/// assert_eq!(Request::parse(&pdu), Ok(request));
+/// assert_eq!(request.function(), 3);
+/// assert_eq!(request.response_length(&[]), Length::Exactly(6));
+///
+/// // What a server would answer with an exception is not written.
+/// let refused = Request::ReadRegisters { function: 3, address: 107, quantity: 126 };
+/// assert_eq!(refused.emit(&mut [0; 5]), Err(mbm::Error::IllegalDataValue));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Request<'a> {
@@ -109,6 +127,16 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::parse`].
+    ///
+    /// ```
+    /// use mbm::pdu::custom::{Function, Rule};
+    /// use mbm::pdu::request::Request;
+    ///
+    /// let function = Function { code: 0x70, request: Rule::Fixed(2), response: Rule::Silence };
+    /// let request = Request::parse_with(&[0x70, 7], &[function])?;
+    /// assert_eq!(request, Request::Custom { function: 0x70, data: &[7] });
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
         let (&function, fields) = pdu.split_first().ok_or(Error::IllegalFunction)?;
         let mut parser = Parser {

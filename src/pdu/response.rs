@@ -15,6 +15,20 @@ use core::mem::discriminant;
 
 /// A response PDU. Register data are in the order of the wire, high byte first. The first bit
 /// of bit data is the lowest bit of the first byte.
+///
+/// ```
+/// use mbm::pdu::response::Response;
+///
+/// let response = Response::ReadRegisters { function: 3, data: &[0x02, 0x2B] };
+/// let mut pdu = [0; 4];
+/// response.emit(&mut pdu)?;
+/// assert_eq!(pdu, [3, 2, 0x02, 0x2B]);
+/// assert_eq!(Response::parse(&pdu), Ok(response));
+/// let refusal = Response::parse(&[0x83, 2])?;
+/// assert_eq!(refusal, Response::Exception { function: 3, code: 2 });
+/// assert_eq!(refusal.function(), 3);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Response<'a> {
@@ -118,6 +132,16 @@ impl<'a> Response<'a> {
     ///
     /// # Errors
     /// As [`Response::parse`].
+    ///
+    /// ```
+    /// use mbm::pdu::custom::{Function, Rule};
+    /// use mbm::pdu::response::Response;
+    ///
+    /// let function = Function { code: 0x70, request: Rule::Silence, response: Rule::Fixed(2) };
+    /// let response = Response::parse_with(&[0x70, 7], &[function])?;
+    /// assert_eq!(response, Response::Custom { function: 0x70, data: &[7] });
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     pub fn parse_with(pdu: &'a [u8], functions: &[custom::Function]) -> Result<Self, Error> {
         let (&function, fields) = pdu.split_first().ok_or(Error::MalformedReply)?;
         let mut parser = Parser {

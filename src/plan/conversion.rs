@@ -16,6 +16,20 @@ pub const GREATEST_POWER: u8 = 10;
 pub const MOST_DECIMALS: u8 = 9;
 
 /// What the numbers of a field mean, beyond its multiplier and divisor.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::{value::Words, Conversion, Field};
+///
+/// // A temperature in tenths of a degree, above -40 degrees; FFFF (hex) if the sensor is broken.
+/// let field = Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, divisor: 10, interval_ms: 1000, ..Field::NONE
+/// };
+/// let conversion = Conversion { not_available: &[0xFFFF], offset: -40, ..Conversion::default() };
+/// let value = |word: &[u16]| Words { words: word, before: 0, field: &field }.decimal(&conversion, 0, 1);
+/// assert_eq!(value(&[615]), Ok(215));
+/// assert_eq!(value(&[0xFFFF]), Err(mbm::Error::NotAvailable));
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Conversion<'a> {
     /// The numbers that mean "not available", as bits: each has as many words as a value has
@@ -34,6 +48,15 @@ pub struct Conversion<'a> {
 /// # Errors
 /// [`Error::NotAvailable`] if the number is not -10 to 10, as the one with which a device says
 /// that it has none; [`Error::InvalidArgument`] if the field has no integer.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, INT16};
+/// use mbm::plan::{conversion::power, value::Words, Field};
+///
+/// let scale = Field { table: HOLDING_REGISTERS, value_type: INT16, ..Field::NONE };
+/// let words = Words { words: &[0xFFFE], before: 0, field: &scale };
+/// assert_eq!(power(&words), Ok(-2));
+/// ```
 pub fn power(words: &Words) -> Result<i8, Error> {
     if !words.field.is_integer() {
         return Err(Error::InvalidArgument);

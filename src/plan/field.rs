@@ -38,6 +38,27 @@ pub const REGISTERS: u8 = 11;
 pub const LONGEST_INTERVAL_MS: u32 = 86_400_000;
 
 /// A value, or several of one type in a row, that a program wants of a unit.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT32};
+/// use mbm::plan::Field;
+/// use mbm::Status;
+///
+/// // Two energies of 32 bits from register 107 on, once a second.
+/// const ENERGIES: Field = Field {
+///     unit: 17,
+///     table: HOLDING_REGISTERS,
+///     value_type: UINT32,
+///     address: 107,
+///     count: 2,
+///     interval_ms: 1000,
+///     ..Field::NONE
+/// };
+/// assert_eq!(ENERGIES.check(0), Status::OK);
+/// assert_eq!((ENERGIES.count(), ENERGIES.values()), (2, 2));
+/// assert_eq!((ENERGIES.length(), ENERGIES.end()), (4, 111));
+/// assert!(!ENERGIES.is_in_bits());
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {

@@ -6,6 +6,19 @@ use super::read::{Position, Read};
 use crate::error::Status;
 
 /// Why a table is refused.
+///
+/// ```
+/// use mbm::plan::{group::{group, Refusal}, Field, Limits, Position, Read};
+/// use mbm::Status;
+/// # let limits = Limits {
+/// #     bits: 0, registers: 0, bit_gap: 0, register_gap: 0, units: &[], excluded: &[],
+/// # };
+///
+/// // A field without a table.
+/// let (mut positions, mut reads) = ([Position::NONE], [Read::default()]);
+/// let grouped = group(&[Field::NONE], 0, &limits, &mut positions, &mut reads, 1);
+/// assert_eq!(grouped, Err(Refusal { status: Status::INVALID_ARGUMENT, field: 0 }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal {
     /// What is wrong.
@@ -29,6 +42,23 @@ pub const MAX_FIELDS: usize = 16_383;
 /// not suffice, with the first field that does not fit.
 /// [`Status::INVALID_ARGUMENT`] for no fields, for more than [`MAX_FIELDS`], and for an
 /// excluded range whose last address is less than its first.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::{group::group, Field, Limits, Position, Read};
+///
+/// let field = |address| Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address, interval_ms: 1000, ..Field::NONE
+/// };
+/// let limits = Limits {
+///     bits: 0, registers: 0, bit_gap: 0, register_gap: 10, units: &[], excluded: &[],
+/// };
+/// let (mut positions, mut reads) = ([Position::NONE; 3], [Read::default(), Read::default()]);
+/// let fields = [field(107), field(110), field(900)];
+/// // The first two are near each other, so one read of four registers has both.
+/// assert_eq!(group(&fields, 0, &limits, &mut positions, &mut reads, 5), Ok(2));
+/// assert_eq!((reads[0].address, reads[0].quantity), (107, 4));
+/// ```
 pub fn group<L: ReadLimits>(
     fields: &[Field],
     has_unit_0: u8,
@@ -76,6 +106,20 @@ pub fn group<L: ReadLimits>(
 /// a field at fault for more than [`MAX_FIELDS`], if a count is 0, or if the counts do not add up to
 /// the fields.
 /// [`Status::BUFFER_TOO_SMALL`] without a field at fault for fewer `reads` than counts.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::{group::take_groups, Field, Position, Read};
+///
+/// let field = |address| Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address, interval_ms: 1000, ..Field::NONE
+/// };
+/// let (mut positions, mut reads) = ([Position::NONE; 3], [Read::default(), Read::default()]);
+/// let fields = [field(107), field(110), field(900)];
+/// // Two fields in the first read, one in the second.
+/// assert_eq!(take_groups(&fields, 0, &[2, 1], &mut positions, &mut reads, 5), Ok(2));
+/// assert_eq!((reads[0].address, reads[0].quantity), (107, 4));
+/// ```
 pub fn take_groups(
     fields: &[Field],
     has_unit_0: u8,

@@ -5,6 +5,13 @@ use crate::error::Status;
 use crate::pdu::{MAX_READ_BITS, MAX_READ_REGISTERS};
 
 /// How much one read of a unit may request. 0 means as [`Limits`] says.
+///
+/// ```
+/// use mbm::plan::UnitLimits;
+///
+/// // Unit 17 answers reads of up to 16 registers.
+/// let limits = UnitLimits { bits: 0, registers: 16, unit: 17 };
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnitLimits {
@@ -26,6 +33,14 @@ pub(super) const fn standard_limit(field: &Field) -> u16 {
 }
 
 /// Addresses that no read may touch.
+///
+/// ```
+/// use mbm::plan::field::HOLDING_REGISTERS;
+/// use mbm::plan::ExcludedRange;
+///
+/// // A read of registers 100 to 109 of unit 17 clears a counter there.
+/// let range = ExcludedRange { first: 100, last: 109, unit: 17, table: HOLDING_REGISTERS };
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExcludedRange {
@@ -40,6 +55,34 @@ pub struct ExcludedRange {
 }
 
 /// The limits of a read. [`Limits`] implements it; a caller may implement it in another way.
+///
+/// ```
+/// use mbm::plan::{ExcludedRange, ReadLimits, UnitLimits};
+///
+/// /// No read has a value in it that nobody wants.
+/// struct NoGaps;
+///
+/// impl ReadLimits for NoGaps {
+///     fn bits(&self) -> u16 {
+///         0
+///     }
+///     fn registers(&self) -> u16 {
+///         0
+///     }
+///     fn bit_gap(&self) -> u16 {
+///         0
+///     }
+///     fn register_gap(&self) -> u16 {
+///         0
+///     }
+///     fn units(&self) -> &[UnitLimits] {
+///         &[]
+///     }
+///     fn excluded(&self) -> &[ExcludedRange] {
+///         &[]
+///     }
+/// }
+/// ```
 pub trait ReadLimits {
     /// The most bits that one read requests; 0 or more than 2000 mean 2000.
     fn bits(&self) -> u16;
@@ -113,6 +156,20 @@ pub trait ReadLimits {
 }
 
 /// What a read may be.
+///
+/// ```
+/// use mbm::plan::Limits;
+///
+/// // Reads of any length, which may cover 10 registers that nobody wants.
+/// let limits = Limits {
+///     bits: 0,
+///     registers: 0,
+///     bit_gap: 0,
+///     register_gap: 10,
+///     units: &[],
+///     excluded: &[],
+/// };
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<'a> {
     /// See [`ReadLimits::bits`].

@@ -7,6 +7,25 @@ use core::cell::Cell;
 
 /// One for each field. While the plan groups its fields, position `n` holds the field that is
 /// `n`th in the sorted table. Then position `n` names the read that field `n` is in.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::{group::group, Field, Limits, Position, Read};
+/// # let limits = Limits {
+/// #     bits: 0, registers: 0, bit_gap: 0, register_gap: 0, units: &[], excluded: &[],
+/// # };
+///
+/// let field = |address| Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address, interval_ms: 1000, ..Field::NONE
+/// };
+/// // The second and the first field are neighbours, so one read has both.
+/// let fields = [field(108), field(107), field(900)];
+/// let (mut positions, mut reads) = ([Position::NONE; 3], [Read::default(), Read::default()]);
+/// assert_eq!(group(&fields, 0, &limits, &mut positions, &mut reads, 3), Ok(2));
+/// assert_eq!(positions.map(|position| position.read()), [0, 0, 1]);
+/// assert_eq!((positions[0].field(), positions[1].first()), (1, 2));
+/// assert!(Position::fields_of(&positions, 0).eq([1, 0]));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
@@ -75,6 +94,31 @@ pub(super) const TRIAL: u8 = 128;
 
 /// One request that the plan repeats, and its result. (The changing fields are cells, because
 /// the reads of a unit change each other.)
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::{group::group, schedule::*, Field, Limits, Position, Read};
+/// use mbm::Status;
+/// # let limits = Limits {
+/// #     bits: 0, registers: 0, bit_gap: 0, register_gap: 0, units: &[], excluded: &[],
+/// # };
+///
+/// let flow = Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address: 107, interval_ms: 1000, ..Field::NONE
+/// };
+/// let (mut positions, mut reads) = ([Position::NONE], [Read::default()]);
+/// group(&[flow], 0, &limits, &mut positions, &mut reads, 1).unwrap();
+/// let (schedule, backoff) = (Schedule::default(), Backoff { first_ms: 100, longest_ms: 1000 });
+/// schedule.start(&reads, 0);
+/// let read = schedule.next(&reads, 0).unwrap();
+/// assert_eq!((read.address, read.quantity, read.words()), (107, 1, 1));
+/// assert!(!read.is_of_bits());
+///
+/// schedule.begin(&reads);
+/// schedule.end(&reads, read, Status::OK, 20, &backoff);
+/// assert_eq!((read.status(), read.has_data()), (Status::OK, true));
+/// assert_eq!((read.age(50), read.index(&reads)), (30, 0));
+/// ```
 #[repr(C)]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Read {

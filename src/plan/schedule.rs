@@ -22,6 +22,13 @@ struct Whole;
 struct Divided;
 
 /// How long the plan leaves a unit alone that does not answer.
+///
+/// ```
+/// use mbm::plan::schedule::Backoff;
+///
+/// // One second after the first request without an answer, then 2 s, 4 s and so on, up to a minute.
+/// let backoff = Backoff { first_ms: 1000, longest_ms: 60_000 };
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Backoff {
     /// After the first request without an answer; each further one doubles it.
@@ -79,6 +86,38 @@ fn merge(reads: &[Read], tree: u16, mut other: u16) -> u16 {
 pub const FOREVER: u32 = i32::MAX as u32;
 
 /// The order of the reads of a plan.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::schedule::{Backoff, Schedule};
+/// use mbm::plan::{group::group, Field, Limits, Position, Read};
+/// use mbm::Status;
+/// # let limits = Limits {
+/// #     bits: 0, registers: 0, bit_gap: 0, register_gap: 0, units: &[], excluded: &[],
+/// # };
+///
+/// let flow = Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address: 107, interval_ms: 1000, ..Field::NONE
+/// };
+/// let (mut positions, mut reads) = ([Position::NONE], [Read::default()]);
+/// group(&[flow], 0, &limits, &mut positions, &mut reads, 1).unwrap();
+///
+/// let schedule = Schedule::default();
+/// let backoff = Backoff { first_ms: 1000, longest_ms: 60_000 };
+/// schedule.start(&reads, 0);
+/// // In the main loop. The program sends the read, and stores its data if the status is OK.
+/// let read = schedule.next(&reads, 0).unwrap();
+/// schedule.begin(&reads);
+/// schedule.end(&reads, read, Status::OK, 20, &backoff);
+/// assert!(schedule.next(&reads, 20).is_none());
+/// assert!(schedule.idle(&reads, 20) <= 1000);
+/// // Somebody wants the value now.
+/// schedule.hasten(&reads, read, 30);
+/// assert_eq!(schedule.next(&reads, 30), Some(read));
+/// schedule.begin(&reads);
+/// schedule.end_divided(&reads, read, Status::OK, 40, &backoff);
+/// schedule.renew(&reads, 40);
+/// ```
 #[repr(C)]
 #[derive(Debug, Default)]
 pub struct Schedule {

@@ -13,6 +13,45 @@ use super::read::{Position, Read, APART, FRESH, HELD, QUEUED, SUSPENDED, TRIAL};
 use crate::error::Status;
 
 /// What a plan's reads are divided with: its parts and storage.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT16};
+/// use mbm::plan::schedule::{Backoff, Schedule};
+/// use mbm::plan::split::{Finding, Splitter};
+/// use mbm::plan::{group::group, Field, Limits, Position, Read};
+/// use mbm::Status;
+/// # let limits = Limits {
+/// #     bits: 0, registers: 0, bit_gap: 0, register_gap: 0, units: &[], excluded: &[],
+/// # };
+///
+/// let field = |address| Field {
+///     unit: 17, table: HOLDING_REGISTERS, value_type: UINT16, address, interval_ms: 1000, ..Field::NONE
+/// };
+/// // One read has both fields. It may become two, so there is storage for two.
+/// let fields = [field(107), field(108)];
+/// let (mut positions, mut reads) = ([Position::NONE; 2], [Read::default(), Read::default()]);
+/// let count = group(&fields, 0, &limits, &mut positions, &mut reads, 2).unwrap();
+/// let (schedule, backoff) = (Schedule::default(), Backoff { first_ms: 1000, longest_ms: 60_000 });
+/// schedule.start(&reads[..count], 0);
+/// let (mut data, mut blocks) = ([0; 2], [0; 2]);
+/// let mut splitter = Splitter {
+///     fields: &fields, positions: &mut positions, reads: &mut reads, data: &mut data,
+///     blocks: &mut blocks, count,
+/// };
+/// splitter.start();
+///
+/// // The device says that it lacks a register of the read.
+/// let before = splitter.reads[0].status();
+/// let refused = Status::ILLEGAL_DATA_ADDRESS;
+/// let read = schedule.next(&splitter.reads[..1], 0).unwrap();
+/// schedule.begin(&splitter.reads[..1]);
+/// schedule.end_divided(&splitter.reads[..1], read, refused, 20, &backoff);
+/// assert_eq!(splitter.end(0, before, 20, 60_000), Finding::Divided);
+/// assert_eq!(splitter.count, 2);
+/// // Once an hour: perhaps the device has got the register.
+/// splitter.forgive();
+/// splitter.join(40, |_old, _new| { /* A number of the program moves too. */ });
+/// ```
 #[derive(Debug)]
 pub struct Splitter<'a> {
     /// The fields.
@@ -30,6 +69,15 @@ pub struct Splitter<'a> {
 }
 
 /// How a read that has ended changes the plan.
+///
+/// ```
+/// use mbm::plan::split::Finding;
+///
+/// fn changes_reads(finding: Finding) -> bool {
+///     finding != Finding::Nothing
+/// }
+/// assert!(changes_reads(Finding::Divided));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
     /// Nothing: it is as the plan says.

@@ -7,6 +7,25 @@ use crate::data::value::{ShortDouble, Value as _};
 use crate::error::Error;
 
 /// A value: its words, and its field.
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, INT16, TEXT};
+/// use mbm::plan::{value::Words, Conversion, Field};
+///
+/// // Tenths of a volt.
+/// let volts = Field { table: HOLDING_REGISTERS, value_type: INT16, divisor: 10, ..Field::NONE };
+/// let words = Words { words: &[2305], before: 0, field: &volts };
+/// assert_eq!((words.integer(), words.int32()), (Ok(231), Ok(231)));
+/// assert_eq!(words.number().map(f64::from_bits), Ok(230.5));
+/// assert_eq!(words.decimal(&Conversion::default(), 0, 1), Ok(2305));
+/// assert_eq!(words.converted(&Conversion::default(), 3).map(f64::from_bits), Ok(230_500.0));
+/// assert_eq!(words.available(&Conversion::default()), Ok(()));
+///
+/// let name = Field { table: HOLDING_REGISTERS, value_type: TEXT, count: 4, ..Field::NONE };
+/// let mut text = [0; 4];
+/// let words = Words { words: &[0x6D62, 0x6D00], before: 0, field: &name };
+/// assert_eq!(words.text(&mut text), Ok(3));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Words<'a> {
     /// The words of its read from the first one that has a part of the value.
@@ -23,6 +42,15 @@ pub struct Words<'a> {
 /// # Errors
 /// [`Error::InvalidArgument`] if the field has no such value. A text is one value, and so are
 /// bits of a register. (Out of line, a plan takes 56 bytes more on a Cortex-M0+.)
+///
+/// ```
+/// use mbm::plan::field::{HOLDING_REGISTERS, UINT32};
+/// use mbm::plan::{value::place, Field};
+///
+/// let energies = Field { table: HOLDING_REGISTERS, value_type: UINT32, address: 107, count: 2, ..Field::NONE };
+/// // The read begins at register 100, so the second energy begins at its tenth word.
+/// assert_eq!(place(&energies, 100, 1), Ok((9, 0)));
+/// ```
 #[inline(always)]
 pub fn place(field: &Field, address: u16, index: u16) -> Result<(u16, u8), Error> {
     if index >= field.values() {
@@ -99,6 +127,15 @@ impl Words<'_> {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for other types.
+    ///
+    /// ```
+    /// use mbm::plan::field::{FLOAT, HOLDING_REGISTERS};
+    /// use mbm::plan::{value::Words, Field};
+    ///
+    /// let volts = Field { table: HOLDING_REGISTERS, value_type: FLOAT, ..Field::NONE };
+    /// let words = Words { words: &[0x4366, 0x8000], before: 0, field: &volts };
+    /// assert_eq!(words.float().map(f32::from_bits), Ok(230.5));
+    /// ```
     pub fn float(&self) -> Result<u32, Error> {
         let raw = self.raw();
         match self.field.value_type {
@@ -113,6 +150,15 @@ impl Words<'_> {
     ///
     /// # Errors
     /// As [`Words::float`].
+    ///
+    /// ```
+    /// use mbm::plan::field::{FLOAT, HOLDING_REGISTERS};
+    /// use mbm::plan::{value::Words, Field};
+    ///
+    /// let volts = Field { table: HOLDING_REGISTERS, value_type: FLOAT, ..Field::NONE };
+    /// let words = Words { words: &[0x4366, 0x8000], before: 0, field: &volts };
+    /// assert_eq!(words.double().map(f64::from_bits), Ok(230.5));
+    /// ```
     pub fn double(&self) -> Result<u64, Error> {
         let raw = self.raw();
         match self.field.value_type {

@@ -9,6 +9,15 @@ use crate::text::{self, TextWriter};
 use crate::time::Micros;
 
 /// The kind of an event.
+///
+/// ```
+/// use mbm::sniffer::EventKind;
+///
+/// fn is_fault(kind: EventKind) -> bool {
+///     matches!(kind, EventKind::Timeout | EventKind::BadCrc | EventKind::Noise)
+/// }
+/// assert!(is_fault(EventKind::Timeout));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum EventKind {
@@ -30,6 +39,31 @@ pub enum EventKind {
 }
 
 /// An event on the bus.
+///
+/// ```
+/// use mbm::frame::Framing;
+/// use mbm::pdu::request::Request;
+/// use mbm::sniffer::{BusDirection, EventKind, Sniffer};
+/// use mbm::text::TextWriter;
+///
+/// let mut sniffer = Sniffer::new(Framing::Tcp);
+/// let mut buffer = [0; 520];
+/// let bytes = [0, 5, 0, 0, 0, 6, 17, 3, 0, 107, 0, 2];
+/// sniffer.feed(&mut buffer, BusDirection::Client, &bytes, 0);
+///
+/// let event = sniffer.next(&mut buffer, &[], 0).unwrap();
+/// assert_eq!((event.kind, event.unit), (EventKind::Request, 17));
+/// let read = Request::ReadRegisters { function: 3, address: 107, quantity: 2 };
+/// assert_eq!((event.request(&[]), event.response(&[])), (Some(read), None));
+/// assert_eq!(event.subject().map(|request| request.address()), Some(107));
+///
+/// let mut text = [0; 80];
+/// let mut line = TextWriter::new(&mut text);
+/// event.text(&mut line);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"unit 17  request    03 read holding registers  107..108");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Event<'a> {
     /// The kind of event.

@@ -52,6 +52,20 @@ const fn rtu_frame_timeout(character: u16) -> u32 {
 const FRAME_TIMEOUT: u32 = 1_000_000;
 
 /// The direction of bytes on the bus.
+///
+/// ```
+/// use mbm::frame::Framing;
+/// use mbm::sniffer::{BusDirection, EventKind, Sniffer};
+///
+/// // The tap says which side has sent the bytes, so the same bytes are the reply of a write here.
+/// let bytes = [17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
+/// let mut sniffer = Sniffer::new(Framing::Rtu);
+/// sniffer.set_baud_rate(19200);
+/// let mut buffer = [0; 512];
+/// sniffer.feed(&mut buffer, BusDirection::Server, &bytes, 10_000);
+/// let event = sniffer.next(&mut buffer, &[], 1_000_000).unwrap();
+/// assert_eq!(event.kind, EventKind::Unpaired);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum BusDirection {
     /// The bytes come from a line that carries both directions.
@@ -63,6 +77,30 @@ pub enum BusDirection {
 }
 
 /// A sniffer. The caller owns the buffer and passes it to each call.
+///
+/// ```
+/// use mbm::frame::{ascii, Framing};
+/// use mbm::sniffer::{BusDirection, EventKind, Sniffer};
+///
+/// let mut sniffer = Sniffer::new(Framing::Rtu);
+/// sniffer.set_baud_rate(19200);
+/// sniffer.set_timeout(500_000);
+/// sniffer.set_frame_timeout(100_000);
+/// sniffer.set_end(ascii::END); // Of ASCII frames, if there were any.
+///
+/// let mut buffer = [0; 256];
+/// let mut kinds = vec![];
+/// // A request, its reply, and 2 s later nothing.
+/// let request = [17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
+/// for (bytes, now) in [(&request[..], 10_000), (&request[..], 20_000), (&[], 2_000_000)] {
+///     sniffer.feed(&mut buffer, BusDirection::Both, bytes, now);
+///     while !sniffer.is_idle(now) {
+///         let Some(event) = sniffer.next(&mut buffer, &[], now) else { break };
+///         kinds.push(event.kind);
+///     }
+/// }
+/// assert_eq!(kinds, [EventKind::Request, EventKind::Reply]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Sniffer {
     framing: Framing,

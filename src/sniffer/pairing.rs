@@ -12,6 +12,14 @@ use crate::time::Micros;
 pub use crate::text::HEAD;
 
 /// The first bytes of a request PDU. They are needed to interpret its reply.
+///
+/// ```
+/// use mbm::sniffer::RequestStart;
+///
+/// let start = RequestStart::new(&[3, 0, 107, 0, 2]);
+/// assert_eq!(start.head(), [3, 0, 107, 0, 2]);
+/// assert_eq!((start.function(), start.address(), start.quantity()), (3, 107, 2));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RequestStart {
     head: [u8; HEAD],

@@ -23,6 +23,17 @@ use crate::pdu::EXCEPTION;
 pub const HEAD: usize = 9;
 
 /// Writes the unit, then the word `what`, in columns of fixed width.
+///
+/// ```
+/// use mbm::text::{start, TextWriter};
+///
+/// let mut text = [0; 32];
+/// let mut line = TextWriter::new(&mut text);
+/// start(&mut line, 17, "request");
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"unit 17  request    ");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn start(line: &mut TextWriter, unit: u8, what: &str) {
     line.put("unit ");
     line.number(unit.into());
@@ -37,6 +48,17 @@ pub fn start(line: &mut TextWriter, unit: u8, what: &str) {
 }
 
 /// Writes `what` and a number of bytes, for bytes that are no valid frame.
+///
+/// ```
+/// use mbm::text::{bytes, TextWriter};
+///
+/// let mut text = [0; 32];
+/// let mut line = TextWriter::new(&mut text);
+/// bytes(&mut line, "noise", 3);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"noise, 3 bytes");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn bytes(line: &mut TextWriter, what: &str, count: usize) {
     line.put(what);
     line.put(", ");
@@ -46,6 +68,20 @@ pub fn bytes(line: &mut TextWriter, what: &str, count: usize) {
 
 /// Describes the content of a frame, or its error. `end` is the last character of an ASCII
 /// frame.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::packet::PduKind;
+/// use mbm::text::{frame, TextWriter};
+///
+/// let mut text = [0; 80];
+/// let mut line = TextWriter::new(&mut text);
+/// let bytes = [17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55];
+/// frame(&mut line, Framing::Rtu, PduKind::Request, &bytes, END);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"unit 17  request    06 write single register  109: 888");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn frame(line: &mut TextWriter, framing: Framing, side: PduKind, frame: &[u8], end: u8) {
     let parsed = match framing {
         Framing::Rtu | Framing::RtuOverTcp => rtu::parse(frame),
@@ -197,6 +233,17 @@ fn unknown(line: &mut TextWriter, pdu: &[u8]) -> bool {
 }
 
 /// Describes a request PDU.
+///
+/// ```
+/// use mbm::text::{request, TextWriter};
+///
+/// let mut text = [0; 80];
+/// let mut line = TextWriter::new(&mut text);
+/// request(&mut line, &[3, 0, 107, 0, 2]);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"03 read holding registers  107..108");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn request(line: &mut TextWriter, pdu: &[u8]) {
     if unknown(line, pdu) {
         return;
@@ -364,6 +411,17 @@ impl<'a> Fields<'a> for Words<'_, '_> {
 }
 
 /// Describes a request PDU by its head, if the rest is not known.
+///
+/// ```
+/// use mbm::text::{head, TextWriter};
+///
+/// let mut text = [0; 80];
+/// let mut line = TextWriter::new(&mut text);
+/// head(&mut line, &[0x10, 0, 107, 0, 2]);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"10 write multiple registers  107..108");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn head(line: &mut TextWriter, head: &[u8]) {
     let Some(code) = head.first() else {
         return;
@@ -380,6 +438,17 @@ pub fn head(line: &mut TextWriter, head: &[u8]) {
 
 /// Describes a response PDU. `head` is the head of its request, from which the addresses of
 /// the values are taken; it is empty if the request is unknown.
+///
+/// ```
+/// use mbm::text::{response, TextWriter};
+///
+/// let mut text = [0; 80];
+/// let mut line = TextWriter::new(&mut text);
+/// response(&mut line, &[3, 4, 0x02, 0x2B, 0, 100], &[3, 0, 107, 0, 2]);
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"03 read holding registers  107..108: 555 100");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn response(line: &mut TextWriter, pdu: &[u8], head: &[u8]) {
     let is_exception = pdu.first().is_some_and(|code| code & EXCEPTION != 0);
     if !is_exception && unknown(line, pdu) {

@@ -6,6 +6,27 @@ use crate::frame::ascii::character;
 
 /// A line of ASCII text in a buffer. If the buffer is too small, the rest of the text is cut
 /// off and [`TextWriter::finish`] returns an error. A zero byte ends the text, also if it was cut.
+///
+/// ```
+/// use mbm::text::TextWriter;
+///
+/// let mut text = [0; 64];
+/// let mut line = TextWriter::new(&mut text);
+/// line.padded("unit", 6);
+/// line.number(17);
+/// line.byte(b':');
+/// line.bytes(&[0x02, 0x2B]);
+/// line.registers(&[0x02, 0x2B]);
+/// line.bits(&[0b101], 3);
+/// line.put(" ");
+/// line.hex(0x0A);
+/// line.hex_word(0x0B0C);
+/// line.put(" ");
+/// line.quoted(b"mbm");
+/// let length = line.finish()?;
+/// assert_eq!(&text[..length], b"unit  17: 02 2B 555 101 0A0B0C \"mbm\"");
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct TextWriter<'a> {
     text: &'a mut [u8],

@@ -316,6 +316,17 @@ impl Cutter {
 }
 
 /// Whether the object that uses the port received a frame or sent it.
+///
+/// ```
+/// use mbm::trace::{Direction, Record};
+///
+/// fn arrow(record: &Record) -> &'static str {
+///     match record.direction {
+///         Direction::Received => "<-",
+///         Direction::Sent => "->",
+///     }
+/// }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Direction {
@@ -326,6 +337,19 @@ pub enum Direction {
 }
 
 /// A frame on the line, or bytes that are no frame.
+///
+/// ```
+/// use mbm::trace::Record;
+/// use mbm::Status;
+///
+/// /// One line of a log.
+/// fn line(record: &Record) -> String {
+///     match record.status {
+///         Status::OK => format!("{:02X?}", record.bytes),
+///         status => format!("{}: {:02X?}", status.text(), record.bytes),
+///     }
+/// }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Record<'a> {
     /// Received or sent.
@@ -346,6 +370,25 @@ pub struct Record<'a> {
 }
 
 /// Takes the records of a trace. A closure `FnMut(&Record)` is one.
+///
+/// ```
+/// use mbm::pdu::custom::{Function, Rule};
+/// use mbm::trace::{Observer, Record};
+///
+/// /// Counts the frames of a line on which a device has the function 65.
+/// struct Count(u32);
+///
+/// impl Observer for Count {
+///     fn frame(&mut self, record: &Record) {
+///         self.0 += 1;
+///     }
+///
+///     fn declaration(&self, code: u8) -> Option<Function> {
+///         let function = Function { code: 65, request: Rule::Fixed(2), response: Rule::Fixed(4) };
+///         (code == function.code).then_some(function)
+///     }
+/// }
+/// ```
 pub trait Observer {
     /// Takes a frame. It is called from within the functions of the port.
     fn frame(&mut self, record: &Record<'_>);

@@ -28,6 +28,31 @@ const RTU_FRAME_TIMEOUT: u32 = 200_000;
 const FRAME_TIMEOUT: u32 = 1_000_000;
 
 /// A port that hands out the frames that go through it.
+///
+/// ```
+/// use mbm::client::BlockingClient;
+/// use mbm::frame::{ascii, Framing};
+/// use mbm::packet::PduKind;
+/// use mbm::server::{SimulatedPort, Tables, Unit};
+/// use mbm::trace::{Record, Trace};
+///
+/// let meter = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100]));
+/// let mut frames = vec![];
+/// let observer = |record: &Record| frames.push(record.bytes.to_vec());
+/// let buffer = [0; 520];
+/// let (port, end) = (SimulatedPort::tcp(meter), ascii::END);
+/// let mut trace = Trace::new(port, Framing::Tcp, PduKind::Request, end, buffer, observer);
+/// trace.set_frame_timeout(200_000);
+///
+/// // The client has the trace in place of the port.
+/// let mut client = BlockingClient::tcp(trace);
+/// client.write_single_register(17, 107, 7)?;
+/// client.port().hand_out_rest();
+/// drop(client);
+/// assert_eq!(frames[0][6..], [17, 6, 0, 107, 0, 7]);
+/// assert_eq!(frames[0], frames[1]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Trace<P, B, O> {
     /// The port to which everything is passed on.
