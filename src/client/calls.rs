@@ -1,6 +1,28 @@
 //! The functions of a client whose calls wait for their end: each one of the standard, and those of
 //! the user. A client that blocks and one whose functions are futures have the same.
 
+/// The example of a call: what is before it, the call, what is after it. The documentation hides the rest.
+macro_rules! example {
+    ([] $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# fn main() -> Result<(), mbm::Error> {\n",
+            "# let mut client = mbm::client::BlockingClient::tcp(tcp());\n# macro_rules! pump { () => { client.port().units.device } }\n",
+            $before, "\n", $call, "?;\n", $after, "\n# Ok(())\n# }\n```"
+        )
+    };
+    ([async] $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));\n",
+            "# async fn example() -> Result<(), mbm::Error> {\n",
+            "# let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);\n# let mut client = mbm::client::AsyncClient::tcp(port);\n# macro_rules! pump { () => { client.port().device.units.device } }\n",
+            $before, "\n", $call, ".await?;\n", $after, "\n# Ok(())\n# }\n",
+            "# fn main() { assert_eq!(block_on(example()), Ok(())); }\n```"
+        )
+    };
+}
+
 /// The functions. `async` and `.await` go into the places for them. `self.call` sends a request and
 /// returns it once it has ended.
 macro_rules! calls {
@@ -14,6 +36,7 @@ macro_rules! calls {
         /// not allow the request ([`Error::InvalidQuantity`], [`Error::InvalidAddress`],
         /// [`Error::InvalidArgument`], [`Error::BroadcastNotAllowed`]), or if its data are more than
         /// the client holds ([`Error::BufferTooSmall`]).
+        #[doc = example!([$($async)?] "let mut coils = [false; 2];", "client.read_coils(17, 0, &mut coils)", "assert_eq!(coils, [true, false]);")]
         pub $($async)? fn read_coils(
             &mut self,
             unit: u8,
@@ -30,6 +53,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut inputs = [false; 2];", "client.read_discrete_inputs(17, 0, &mut inputs)", "assert_eq!(inputs, [false, true]);")]
         pub $($async)? fn read_discrete_inputs(
             &mut self,
             unit: u8,
@@ -46,6 +70,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut registers = [0; 2];", "client.read_holding_registers(17, 107, &mut registers)", "assert_eq!(registers, [555, 100]);")]
         pub $($async)? fn read_holding_registers(
             &mut self,
             unit: u8,
@@ -62,6 +87,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut registers = [0; 2];", "client.read_input_registers(17, 0, &mut registers)", "assert_eq!(registers, [21, 22]);")]
         pub $($async)? fn read_input_registers(
             &mut self,
             unit: u8,
@@ -79,6 +105,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [door, pump] = client.coils(17, 0)", "assert!(door && !pump);")]
         pub $($async)? fn coils<const N: usize>(
             &mut self,
             unit: u8,
@@ -94,6 +121,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [is_open, is_wet] = client.discrete_inputs(17, 0)", "assert!(!is_open && is_wet);")]
         pub $($async)? fn discrete_inputs<const N: usize>(
             &mut self,
             unit: u8,
@@ -111,6 +139,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [flow, total] = client.holding_registers(17, 107)", "assert_eq!([flow, total], [555, 100]);")]
         pub $($async)? fn holding_registers<const N: usize>(
             &mut self,
             unit: u8,
@@ -126,6 +155,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [inside, outside] = client.input_registers(17, 0)", "assert_eq!([inside, outside], [21, 22]);")]
         pub $($async)? fn input_registers<const N: usize>(
             &mut self,
             unit: u8,
@@ -141,6 +171,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "client.write_single_coil(17, 1, true)", "# assert!(pump!().values.coils.cells[1]);")]
         pub $($async)? fn write_single_coil(
             &mut self,
             unit: u8,
@@ -157,6 +188,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "client.write_single_register(17, 107, 888)", "# assert_eq!(pump!().values.holding_registers.cells[0], 888);")]
         pub $($async)? fn write_single_register(
             &mut self,
             unit: u8,
@@ -172,6 +204,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "client.write_multiple_coils(17, 0, &[false, true])", "# assert_eq!(pump!().values.coils.cells, [false, true]);")]
         pub $($async)? fn write_multiple_coils(
             &mut self,
             unit: u8,
@@ -188,6 +221,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "client.write_multiple_registers(17, 109, &[7, 8])", "# assert_eq!(pump!().values.holding_registers.cells[2..], [7, 8]);")]
         pub $($async)? fn write_multiple_registers(
             &mut self,
             unit: u8,
@@ -205,6 +239,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "// Sets bit 0, and leaves the others.", "client.mask_write_register(17, 107, 0xFFFE, 0x0001)", "# assert_eq!(pump!().values.holding_registers.cells[0], 555);")]
         pub $($async)? fn mask_write_register(
             &mut self,
             unit: u8,
@@ -223,6 +258,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut read = [0; 2];", "client.read_write_multiple_registers(17, (109, &mut read), (109, &[7, 8]))", "// The write comes first.\nassert_eq!(read, [7, 8]);")]
         pub $($async)? fn read_write_multiple_registers(
             &mut self,
             unit: u8,
@@ -240,6 +276,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let outputs = client.read_exception_status(17)", "assert_eq!(outputs, 0b0000_0101);")]
         pub $($async)? fn read_exception_status(&mut self, unit: u8) -> Result<u8, Error> {
             let call = Call::short(unit, FunctionSpec::READ_EXCEPTION_STATUS, (0, 0), 1)?;
             let call = self.call(call)$($wait)*?;
@@ -252,6 +289,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "// Return Query Data: the device sends the words back.\nlet mut data = [555, 100];", "client.diagnostics(17, 0, &mut data)", "assert_eq!(data, [555, 100]);")]
         pub $($async)? fn diagnostics(
             &mut self,
             unit: u8,
@@ -270,6 +308,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let counter = client.get_comm_event_counter(17)", "assert_eq!((counter.status, counter.events), (0, 0));")]
         pub $($async)? fn get_comm_event_counter(
             &mut self,
             unit: u8,
@@ -286,6 +325,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "let mut place = [0; mbm::client::CommEventLog::BYTES];", "let log = client.get_comm_event_log(17, &mut place)", "assert_eq!((log.status, log.events), (0, 0));")]
         pub $($async)? fn get_comm_event_log<'b>(
             &mut self,
             unit: u8,
@@ -300,6 +340,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "let mut place = [0; 250];", "let id = client.report_server_id(17, &mut place)", "assert_eq!(id.last(), Some(&0xFF)); // The run indicator of this device: on.")]
         pub $($async)? fn report_server_id<'b>(
             &mut self,
             unit: u8,
@@ -313,6 +354,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "// Records 0 and 1 of file 4.\nlet mut records = [0; 2];", "client.read_file_record(17, 4, 0, &mut records)", "# assert_eq!(records, [0, 0]);")]
         pub $($async)? fn read_file_record(
             &mut self,
             unit: u8,
@@ -331,6 +373,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "client.write_file_record(17, 4, 0, &[7, 8])", "# assert_eq!(pump!().records[..2], [7, 8]);")]
         pub $($async)? fn write_file_record(
             &mut self,
             unit: u8,
@@ -351,6 +394,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "use mbm::client::ReadRecords;\n\nlet (mut first, mut last) = ([0; 2], [0; 1]);\nlet mut groups = [\n    ReadRecords { file: 4, record: 0, records: &mut first },\n    ReadRecords { file: 4, record: 9, records: &mut last },\n];", "client.read_file_records(17, &mut groups)", "# assert_eq!((first, last), ([0, 0], [0]));")]
         pub $($async)? fn read_file_records(
             &mut self,
             unit: u8,
@@ -369,6 +413,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "use mbm::client::WriteRecords;\n\nlet groups = [\n    WriteRecords { file: 4, record: 0, records: &[7, 8] },\n    WriteRecords { file: 4, record: 9, records: &[9] },\n];", "client.write_file_records(17, &groups)", "# assert_eq!(pump!().records, [7, 8, 0, 0, 0, 0, 0, 0, 0, 9]);")]
         pub $($async)? fn write_file_records(
             &mut self,
             unit: u8,
@@ -386,6 +431,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the queue has more than `place`.
+        #[doc = example!([$($async)?] "let mut place = [0; 31];", "let queue = client.read_fifo_queue(17, 1000, &mut place)", "assert_eq!(queue, [7, 8]);")]
         pub $($async)? fn read_fifo_queue<'b>(
             &mut self,
             unit: u8,
@@ -403,6 +449,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "use mbm::pdu::identification::DeviceIdCode;\n\nlet mut place = [0; 250];", "let reply = client.read_device_identification(17, DeviceIdCode::Basic, 0, &mut place)", "assert_eq!(reply.objects.iter().next(), Some((0, &b\"mbm\"[..])));")]
         pub $($async)? fn read_device_identification<'b>(
             &mut self,
             unit: u8,
@@ -422,6 +469,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::NoProgress`] if the device repeats itself.
+        #[doc = example!([$($async)?] "use mbm::pdu::identification::DeviceIdCode;\n\nlet mut objects = vec![];\nlet take = |id, value: &[u8]| objects.push((id, value.to_vec()));", "client.identify(17, DeviceIdCode::Basic, take)", "assert_eq!(objects[1], (1, b\"pump\".to_vec()));")]
         pub $($async)? fn identify(
             &mut self,
             unit: u8,
@@ -452,6 +500,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "// A request of CANopen.\nlet mut place = [0; 250];", "let answer = client.encapsulated_interface_transport(17, 0x0D, &[1, 2], &mut place)", "assert_eq!(answer, [1, 2]);")]
         pub $($async)? fn encapsulated_interface_transport<'b>(
             &mut self,
             unit: u8,
@@ -471,6 +520,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "use mbm::pdu::custom::Rule;\n\n// Function 65 of a device, whose response has the byte after the function code and two more.\nlet mut place = [0; 3];", "let answer = client.custom(17, 65, &[1, 2, 3], Rule::Fixed(4), &mut place)", "assert_eq!(answer, [1, 2, 3]);")]
         pub $($async)? fn custom<'b>(
             &mut self,
             unit: u8,
@@ -492,6 +542,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`]; [`Error::BufferTooSmall`] if the place is.
+        #[doc = example!([$($async)?] "// Reads two registers from 107 on.\nlet mut place = [0; 250];", "let answer = client.forward(17, 3, &[0, 107, 0, 2], &mut place)", "assert_eq!(answer, [4, 0x02, 0x2B, 0, 100]);")]
         pub $($async)? fn forward<'b>(
             &mut self,
             unit: u8,
@@ -543,4 +594,4 @@ macro_rules! accessors {
     };
 }
 
-pub(super) use {accessors, calls};
+pub(super) use {accessors, calls, example};

@@ -1,6 +1,6 @@
 //! A master whose functions are futures, over the traits of embedded-io-async.
 
-use super::calls::calls;
+use super::calls::{calls, example};
 use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;

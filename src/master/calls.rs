@@ -2,6 +2,28 @@
 //! ModbusMaster, and reads into arrays. A master that blocks and one whose functions are futures have
 //! the same.
 
+/// The example of a call: what is before it, the call, what is after it. The documentation hides the rest.
+macro_rules! example {
+    ([] $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# fn main() -> Result<(), mbm::Error> {\n",
+            "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::Master::new(17, rtu(), buffers);\n# macro_rules! pump { () => { master.port().units.device } }\n",
+            $before, "\n", $call, "?;\n", $after, "\n# Ok(())\n# }\n```"
+        )
+    };
+    ([async] $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));\n",
+            "# async fn example() -> Result<(), mbm::Error> {\n",
+            "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::AsyncMaster::new(17, rtu(), micros, Delay, buffers);\n# macro_rules! pump { () => { master.device().units.device } }\n",
+            $before, "\n", $call, ".await?;\n", $after, "\n# Ok(())\n# }\n",
+            "# fn main() { assert_eq!(block_on(example()), Ok(())); }\n```"
+        )
+    };
+}
+
 /// The functions. `async` and `.await` go into the places for them. `self.request` makes a request and
 /// waits for its end.
 macro_rules! calls {
@@ -15,6 +37,7 @@ macro_rules! calls {
         /// does not allow the quantity or the addresses ([`Error::InvalidQuantity`],
         /// [`Error::InvalidAddress`]), or if the buffers cannot hold the data
         /// ([`Error::BufferTooSmall`], [`Error::InvalidQuantity`]).
+        #[doc = example!([$($async)?] "let mut coils = [false; 2];", "master.read_coils(0, &mut coils)", "assert_eq!(coils, [true, false]);")]
         pub $($async)? fn read_coils(&mut self, address: u16, coils: &mut [bool]) -> Result<(), Error> {
             let quantity = quantity(coils.len());
             self.request(|master| master.start_read_coils(address, quantity))$($wait)*?;
@@ -25,6 +48,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut inputs = [false; 2];", "master.read_discrete_inputs(0, &mut inputs)", "assert_eq!(inputs, [false, true]);")]
         pub $($async)? fn read_discrete_inputs(
             &mut self,
             address: u16,
@@ -39,6 +63,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut registers = [0; 2];", "master.read_holding_registers(107, &mut registers)", "assert_eq!(registers, [555, 100]);")]
         pub $($async)? fn read_holding_registers(
             &mut self,
             address: u16,
@@ -53,6 +78,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut registers = [0; 2];", "master.read_input_registers(0, &mut registers)", "assert_eq!(registers, [21, 22]);")]
         pub $($async)? fn read_input_registers(
             &mut self,
             address: u16,
@@ -67,6 +93,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "master.write_single_coil(1, true)", "# assert!(pump!().values.coils.cells[1]);")]
         pub $($async)? fn write_single_coil(&mut self, address: u16, on: bool) -> Result<(), Error> {
             self.request(|master| master.start_write_single_coil(address, on))$($wait)*
         }
@@ -75,6 +102,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "master.write_single_register(107, 888)", "# assert_eq!(pump!().values.holding_registers.cells[0], 888);")]
         pub $($async)? fn write_single_register(&mut self, address: u16, value: u16) -> Result<(), Error> {
             self.request(|master| master.start_write_single_register(address, value))$($wait)*
         }
@@ -83,6 +111,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "master.write_multiple_coils(0, &[false, true])", "# assert_eq!(pump!().values.coils.cells, [false, true]);")]
         pub $($async)? fn write_multiple_coils(
             &mut self,
             address: u16,
@@ -95,6 +124,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "master.write_multiple_registers(109, &[7, 8])", "# assert_eq!(pump!().values.holding_registers.cells[2..], [7, 8]);")]
         pub $($async)? fn write_multiple_registers(
             &mut self,
             address: u16,
@@ -107,6 +137,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "// Sets bit 0, and leaves the others.", "master.mask_write_register(107, 0xFFFE, 0x0001)", "# assert_eq!(pump!().values.holding_registers.cells[0], 555);")]
         pub $($async)? fn mask_write_register(
             &mut self,
             address: u16,
@@ -120,6 +151,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "let mut read = [0; 2];", "master.read_write_multiple_registers((109, &mut read), (109, &[7, 8]))", "// The write comes first.\nassert_eq!(read, [7, 8]);")]
         pub $($async)? fn read_write_multiple_registers(
             &mut self,
             (read_address, read): (u16, &mut [u16]),
@@ -137,6 +169,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [door, pump] = master.coils(0)", "assert!(door && !pump);")]
         pub $($async)? fn coils<const N: usize>(&mut self, address: u16) -> Result<[bool; N], Error> {
             const { assert!(N >= 1 && N <= MAX_READ_BITS as usize, "1 to 2000 coils") };
             let mut coils = [false; N];
@@ -148,6 +181,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [is_open, is_wet] = master.discrete_inputs(0)", "assert!(!is_open && is_wet);")]
         pub $($async)? fn discrete_inputs<const N: usize>(
             &mut self,
             address: u16,
@@ -164,6 +198,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [flow, total] = master.holding_registers(107)", "assert_eq!([flow, total], [555, 100]);")]
         pub $($async)? fn holding_registers<const N: usize>(
             &mut self,
             address: u16,
@@ -178,6 +213,7 @@ macro_rules! calls {
         ///
         /// # Errors
         /// As [`Self::read_coils`].
+        #[doc = example!([$($async)?] "", "let [inside, outside] = master.input_registers(0)", "assert_eq!([inside, outside], [21, 22]);")]
         pub $($async)? fn input_registers<const N: usize>(
             &mut self,
             address: u16,
@@ -190,4 +226,4 @@ macro_rules! calls {
     };
 }
 
-pub(super) use calls;
+pub(super) use {calls, example};

@@ -25,7 +25,7 @@ use crate::error::{Error, Status};
 use crate::pdu::functions::FunctionSpec;
 use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::Port;
-use calls::calls;
+use calls::{calls, example};
 use core::task::Poll;
 use node::Node;
 use request::Line;
