@@ -47,6 +47,46 @@ use embedded_io_async::{Read, Write};
 ///
 /// A call leaves its request inside the client while it waits, so its future is small. `D` is as in
 /// [`BlockingClient`](super::BlockingClient).
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+/// # async fn example() -> Result<(), mbm::Error> {
+/// # let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);
+/// # let mut client = mbm::client::AsyncClient::tcp(port);
+/// client.settings().response_timeout.set_timeout(500)?;
+/// client.policy().retries = 2;
+/// client.holding_registers::<2>(17, 107).await?;
+/// assert_eq!(client.unanswered(), 0);
+/// client.storage();
+/// client.line().set_in_flight(1);
+/// // After a lost connection: a new one, and the rest of the old one does not count.
+/// client.port().device = tcp();
+/// client.reconnect();
+/// # Ok(())
+/// # }
+/// # fn main() { assert_eq!(block_on(example()), Ok(())); }
+/// ```
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+/// # async fn example() -> Result<(), mbm::Error> {
+/// # let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);
+/// # let mut client = mbm::client::AsyncClient::tcp(port);
+/// client.settings().response_timeout.set_timeout(500)?;
+/// client.policy().retries = 2;
+/// client.holding_registers::<2>(17, 107).await?;
+/// assert_eq!(client.unanswered(), 0);
+/// client.storage();
+/// client.line().set_in_flight(1);
+/// // After a lost connection: a new one, and the rest of the old one does not count.
+/// client.port().device = tcp();
+/// client.reconnect();
+/// # Ok(())
+/// # }
+/// # fn main() { assert_eq!(block_on(example()), Ok(())); }
+/// ```
 #[derive(Debug)]
 pub struct AsyncClient<L, const D: usize = CALL_BYTES> {
     client: Client<L, Call<D>, 1>,

@@ -57,6 +57,44 @@ use crate::port::Port;
 ///
 /// `D` is how many bytes of data the client has a place for. It takes three times as many bytes of
 /// RAM: firmware that reads only 20 registers at once may have a [`BlockingClient::new`] of 40.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// client.settings().response_timeout.set_timeout(500)?;
+/// client.policy().retries = 2;
+/// client.holding_registers::<2>(17, 107)?;
+/// assert_eq!(client.unanswered(), 0);
+/// assert_eq!(client.port().frames, 1);
+/// // The memory of the client, and its line.
+/// let (_buffers, _line) = (client.storage(), ());
+/// client.line().set_in_flight(1);
+/// // After a lost connection: a new one, and the rest of the old one does not count.
+/// *client.port() = tcp();
+/// client.reconnect();
+/// # Ok(())
+/// # }
+/// ```
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// client.settings().response_timeout.set_timeout(500)?;
+/// client.policy().retries = 2;
+/// client.holding_registers::<2>(17, 107)?;
+/// assert_eq!(client.unanswered(), 0);
+/// assert_eq!(client.port().frames, 1);
+/// // The memory of the client, and its line.
+/// let (_buffers, _line) = (client.storage(), ());
+/// client.line().set_in_flight(1);
+/// // After a lost connection: a new one, and the rest of the old one does not count.
+/// *client.port() = tcp();
+/// client.reconnect();
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct BlockingClient<L, const D: usize = CALL_BYTES> {
     client: Client<L, Call<D>, 1>,

@@ -144,6 +144,18 @@ impl<const D: usize> ClientRequest for Call<D> {
 
 /// Consecutive records of a file to read: see
 /// [`BlockingClient::read_file_records`](super::BlockingClient::read_file_records).
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::client::ReadRecords;
+///
+/// let mut records = [0; 3];
+/// client.read_file_records(17, &mut [ReadRecords { file: 4, record: 7, records: &mut records }])?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(PartialEq, Eq, Debug)]
 pub struct ReadRecords<'a> {
     /// File number, from 1 on.
@@ -156,6 +168,18 @@ pub struct ReadRecords<'a> {
 
 /// Consecutive records of a file to write: see
 /// [`BlockingClient::write_file_records`](super::BlockingClient::write_file_records).
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::client::WriteRecords;
+///
+/// let group = WriteRecords { file: 4, record: 7, records: &[555, 100] };
+/// client.write_file_records(17, &[group])?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct WriteRecords<'a> {
     /// File number, from 1 on.
@@ -244,6 +268,18 @@ pub(super) fn take_records(mut data: &[u8], groups: &mut [ReadRecords]) -> Resul
 }
 
 /// The response to function 0B.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::client::CommEventCounter;
+///
+/// let CommEventCounter { status, events } = client.get_comm_event_counter(17)?;
+/// assert_eq!(status, 0); // The device is not busy with an earlier request.
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CommEventCounter {
     /// FFFF (hex) while the device still carries out an earlier request, otherwise 0.
@@ -253,6 +289,19 @@ pub struct CommEventCounter {
 }
 
 /// The response to function 0C.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::client::CommEventLog;
+///
+/// let mut place = [0; CommEventLog::BYTES];
+/// let log = client.get_comm_event_log(17, &mut place)?;
+/// let latest: Option<&u8> = log.log.first();
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CommEventLog<'a> {
     /// FFFF (hex) while the device still carries out an earlier request, otherwise 0.

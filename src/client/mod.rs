@@ -73,6 +73,35 @@ pub const ASCII_SILENCE: u32 = millis(1000);
 const WRITE_RETRY_DELAY: u32 = millis(1);
 
 /// A client on a [`Transport`], for up to `N` pending requests.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+/// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// let mut words = [0; 2];
+/// let mut client: Client<_, _, 4> = Client::new(line);
+/// client.settings().response_timeout.set_timeout(500)?;
+/// client.policy().retries = 2;
+/// client.queue(Request::read_holding_registers(17, 107, &mut words)?)?;
+/// assert_eq!(client.pending(), 1);
+///
+/// // In the main loop:
+/// # let ended = loop {
+/// let now = client.port().units.device.records[0].into(); // The time, by the clock of the program.
+/// # let now: u32 = now; let now = now + mbm::port::Port::micros(client.port());
+/// if let Some(request) = client.poll(now) {
+///     request.result()?;
+///     assert_eq!(request.registers(), [555, 100]);
+/// #   break request;
+/// }
+/// let sleep = client.poll_delay(now); // Microseconds.
+/// # };
+/// assert!(client.is_connected());
+/// assert_eq!(client.unanswered(), 0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Client<L, J, const N: usize> {
     queue: RequestQueue<J, N>,
@@ -131,6 +160,25 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     }
 
     /// The buffers.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// use mbm::client::Storage;
+    ///
+    /// // A program that has its own storage finds its counters there.
+    /// fn memory<L: mbm::client::Transport<J>, J: mbm::client::ClientRequest>(
+    ///     client: &mut Client<L, J, 4>,
+    /// ) -> &mut L::Storage {
+    ///     client.storage()
+    /// }
+    /// let mut client: Client<_, Request, 4> = Client::new(line);
+    /// memory(&mut client);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn storage(&mut self) -> &mut L::Storage {
         self.line.storage()
     }
@@ -169,6 +217,19 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
 
     /// Cancels the first pending request for which `matches` returns true, and returns the
     /// request; `None` if there is no such request.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_single_coil(17, 3, true)?)?;
+    /// let cancelled = client.cancel(|request| request.state.unit == 17).unwrap();
+    /// assert_eq!(cancelled.result(), Err(mbm::Error::Cancelled));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn cancel(&mut self, matches: impl Fn(&J) -> bool) -> Option<J> {
         let request = self.queue.cancel_one(matches)?;
         if request.state().is_sent() {
@@ -187,6 +248,18 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
     /// Call this after the link was opened anew. The client discards partly received and
     /// partly sent frames. The next polls return the requests in flight with
     /// [`Status::LINK_LOST`]. Queued requests are sent over the new link.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut client: Client<_, Request, 4> = Client::new(line);
+    /// *client.port() = tcp(); // A new connection.
+    /// client.reconnect();
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn reconnect(&mut self) {
         self.line.release(None);
         if !self.queue.has_broadcast {
@@ -198,6 +271,20 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
 
     /// Leaves the line to another user of the port until [`Client::take_back`]. Returns
     /// false, and changes nothing, if a request is in flight or another user has the line.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut client: Client<_, Request, 4> = Client::new(line);
+    /// if client.suspend() {
+    ///     // Another object uses the line meanwhile.
+    ///     client.take_back();
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use = "the line may be in use"]
     pub fn suspend(&mut self) -> bool {
         self.line.suspend(&mut self.queue)
@@ -205,6 +292,19 @@ impl<L: Transport<J>, J: ClientRequest, const N: usize> Client<L, J, N> {
 }
 
 /// A serial line, or a TCP stream.
+///
+/// ```
+/// use mbm::client::{Client, Request, Transport};
+///
+/// /// Queues a request, on whichever line the client is.
+/// fn switch_on<L: Transport<Request<'static>>>(
+///     client: &mut Client<L, Request<'static>, 4>,
+/// ) -> Result<(), mbm::Error> {
+///     client.queue(Request::write_single_coil(17, 3, true)?)?;
+///     Ok(())
+/// }
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub trait Transport<J> {
     /// True if unit 0 addresses all units (broadcast).
     const HAS_BROADCAST: bool;

@@ -6,6 +6,19 @@ use crate::time::{millis, Micros};
 
 /// How the wait before a retry grows from one retry to the next. `wait` and `most` are
 /// the arguments of [`Waits::set_backoff`].
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::client::Backoff;
+///
+/// // 100 ms before the first retry, then 200 and 400 ms, at most 500 ms.
+/// client.policy().retries = 4;
+/// client.policy().waits.set_backoff(Backoff::Exponential, 100_000, 500_000);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Backoff {
@@ -39,6 +52,16 @@ impl Backoff {
 type Grow = fn(&Waits, u8, u32) -> u32;
 
 /// How long to wait before each retry. Times are in microseconds.
+///
+/// ```
+/// use mbm::client::{Backoff, Policy};
+///
+/// let mut waits = Policy::DEFAULT.waits;
+/// waits.set_backoff(Backoff::Linear, 100_000, 250_000);
+/// assert_eq!([1, 2, 3].map(|retry| waits.wait(retry, || 0)), [100_000, 200_000, 250_000]);
+/// // Up to a fifth less, at random, so that many clients do not repeat at the same time.
+/// assert!(waits.set_jitter(20, true));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Waits {
@@ -56,6 +79,18 @@ pub struct Waits {
 }
 
 /// How many retries a request gets, and how long the client waits before each.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// let policy = client.policy();
+/// policy.retries = 2;
+/// policy.busy_retries = 5;
+/// policy.busy_wait_ms = 200;
+/// # Ok(())
+/// # }
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Policy {

@@ -39,6 +39,20 @@ impl<P: Port, S: ClientStorage, J: ClientRequest> Serial<P, S, J> {
 impl<P: Port, S: ClientStorage, J: ClientRequest, const N: usize> Client<Serial<P, S, J>, J, N> {
     /// A client that sends RTU frames through a TCP stream, without a silence between
     /// frames and without broadcasts.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::client::{Client, Frame, Request};
+    /// use mbm::server::SimulatedPort;
+    ///
+    /// let port = SimulatedPort::rtu_over_tcp(unit());
+    /// let mut client: Client<_, Request, 4> = Client::over_tcp(port, Frame::new([0; 256]));
+    /// client.queue(Request::write_single_coil(17, 0, true)?)?;
+    /// assert_eq!(client.pending(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub const fn over_tcp(port: P, storage: S) -> Self {
         let mut client = Client::new(Serial::new(port, storage));
         client.queue.has_broadcast = false;

@@ -8,6 +8,25 @@ use crate::error::Status;
 use crate::time::{elapsed, timeout_at_most};
 
 /// The storage of a client: the frame buffer of [`Storage`], and more that is optional.
+///
+/// ```
+/// use mbm::client::{ClientStorage, UnitRecord};
+///
+/// /// How many requests of a unit were not answered.
+/// fn unanswered(storage: &impl ClientStorage, unit: u16) -> u32 {
+///     let record = storage.units().iter().find(|record| record.unit == unit);
+///     record.map_or(0, |record| record.requests - record.replies)
+/// }
+///
+/// /// Begins to count anew.
+/// fn clear(storage: &mut impl ClientStorage) {
+///     for record in storage.units_mut() {
+///         *record = UnitRecord::new(record.unit as u8, record.delay);
+///     }
+///     // What is not sent yet stays.
+///     let (_bytes, _jitter) = (storage.outgoing().len(), storage.random());
+/// }
+/// ```
 pub trait ClientStorage: Storage<Count = u16> {
     /// The bytes of [`ClientStorage::outgoing`] from index `from` to before index `to`. The client
     /// ensures that `from` <= `to` <= length of the buffer.
@@ -80,6 +99,13 @@ pub trait ClientStorage: Storage<Count = u16> {
 impl<F: AsRef<[u8]> + AsMut<[u8]>> ClientStorage for Frame<F> {}
 
 /// The buffers of a TCP client: arrays, slices or other containers of bytes.
+///
+/// ```
+/// use mbm::client::TcpBuffers;
+///
+/// // The bytes received, and the bytes to send, of any frame.
+/// let buffers = TcpBuffers::new([0; 260], [0; 260]);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct TcpBuffers<F, O> {
     incoming: Frame<F>,

@@ -4,6 +4,16 @@ use crate::error::Status;
 use crate::time::{clamped, elapsed, Micros, LONGEST_TIMEOUT_MS};
 
 /// The settings and counts of one unit. The counts wrap at 2^32.
+///
+/// ```
+/// use mbm::client::UnitRecord;
+///
+/// // 50 ms between two requests to unit 17.
+/// let mut record = UnitRecord::new(17, 50_000);
+/// record.timeout_ms = 3000;
+/// record.retry_limit = 2;
+/// assert_eq!(record.requests, 0);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct UnitRecord {

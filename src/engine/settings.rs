@@ -5,6 +5,19 @@ use crate::time::{self, millis, Micros16, DEFAULT_SILENCE};
 
 /// A time in microseconds with a default. It stores the difference from the default, so zeroed
 /// memory is the default, and no code has to set it.
+///
+/// ```
+/// use mbm::master::MicrosSetting;
+///
+/// let mut timeout: MicrosSetting<2_000_000> = MicrosSetting::default();
+/// assert_eq!(timeout.get(), 2_000_000);
+/// timeout.set_timeout(500)?;
+/// assert_eq!(timeout, MicrosSetting::new(500_000));
+/// assert_eq!(timeout.set_timeout(1_000_001), Err(mbm::Error::InvalidArgument));
+/// timeout.set_delay(20)?;
+/// assert_eq!(timeout.get(), 20_000);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[repr(transparent)]
 pub struct MicrosSetting<const DEFAULT: u32>(u32);
@@ -99,6 +112,16 @@ impl Settings {
     };
 
     /// Sets the silence before a request, in microseconds.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+    /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+    /// master.settings().set_gap(5_000);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub const fn set_gap(&mut self, microseconds: u32) {
         self.gap = MicrosSetting::new(time::clamped(microseconds));
     }

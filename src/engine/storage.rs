@@ -7,6 +7,19 @@ use core::hash::Hash;
 use core::ops::{Add, AddAssign, Sub, SubAssign};
 
 /// The counters, in the order in which they are stored.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+/// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+/// use mbm::master::Counter;
+///
+/// master.holding_registers::<2>(107)?;
+/// assert_eq!(master.storage().counters[Counter::Replies as usize], 1);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Counter {
@@ -35,6 +48,12 @@ pub const COUNTERS: usize = 9;
 
 /// A number of bytes in a frame buffer: [`u8`] for buffers of at most 255 bytes, which costs
 /// an AVR half as much as [`u16`].
+///
+/// ```
+/// use mbm::master::Count;
+///
+/// assert_eq!(u8::ZERO, 0);
+/// ```
 pub trait Count:
     Copy
     + Ord
@@ -118,6 +137,16 @@ impl Count for usize {
 ///
 /// They keep every index and count within [`Storage::capacity`], so an implementation need not
 /// check them.
+///
+/// ```
+/// use mbm::client::{Frame, Storage};
+///
+/// /// Both `Frame` and `Buffers` are storage, and so are arrays of bytes.
+/// fn is_storage(storage: impl Storage) {}
+///
+/// is_storage(Frame::new([0_u8; 256]));
+/// is_storage([0_u8; 256]);
+/// ```
 pub trait Storage {
     /// The type of lengths and indexes.
     type Count: Count;
@@ -162,6 +191,14 @@ pub trait Storage {
 
 /// The memory of a master: transmit and response words beside the frame buffer. The engine
 /// uses at most [`Words::transmit_words`] and [`Words::response_words`] words.
+///
+/// ```
+/// use mbm::master::{Buffers, Words};
+///
+/// let mut buffers = Buffers::new([0; 64], [0; 20], [0; 10]);
+/// buffers.transmit()[0] = 555;
+/// assert_eq!(buffers.response().len(), 20);
+/// ```
 pub trait Words: Storage<Count = u8> {
     /// The response timeout in microseconds. `settings` has that of the line.
     // The core calls it; it may change in any version.
@@ -202,6 +239,13 @@ pub trait Words: Storage<Count = u8> {
 
 /// A frame buffer in Rust: an array, a slice or another container of bytes. An index out of
 /// range reads 0 and writes nothing.
+///
+/// ```
+/// use mbm::client::Frame;
+///
+/// // For any RTU frame; an ASCII frame needs 513.
+/// let frame = Frame::new([0; 256]);
+/// ```
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Frame<F> {
     bytes: F,
@@ -275,6 +319,14 @@ macro_rules! bytes_are_a_frame_buffer {
 bytes_are_a_frame_buffer!((const N: usize) [u8; N], () &mut [u8]);
 
 /// The memory of a master in Rust. A word out of range is not filled, and is sent as 0.
+///
+/// ```
+/// use mbm::master::Buffers;
+///
+/// // The frame buffer, the words that a read fills, the words that a write sends.
+/// let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
+/// assert_eq!(buffers.counters, [0; 9]);
+/// ```
 #[derive(Clone, Hash, Debug, Default)]
 pub struct Buffers<F, R, T> {
     frame: Frame<F>,

@@ -4,6 +4,18 @@
 ///
 /// A client gets it by [`Error::exception`](super::Error::exception). A server refuses a request with
 /// it.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// use mbm::Exception;
+///
+/// let error = client.holding_registers::<2>(17, 500).unwrap_err();
+/// assert_eq!(error.exception(), Some(Exception::IllegalDataAddress));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Exception {

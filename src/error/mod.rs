@@ -14,6 +14,19 @@ use core::task::Poll;
 
 /// The outcome of a call: success, an exception code of the remote device, or an error of
 /// the library, the line or the caller. [`Status::result`] makes a `Result` of it.
+///
+/// ```
+/// use mbm::{Error, Status};
+/// use std::task::Poll;
+///
+/// let status = Status::ILLEGAL_DATA_ADDRESS;
+/// assert_eq!(status, Status::exception(2));
+/// assert!(status.is_exception() && !status.is_failure());
+/// assert_eq!(status.result(), Err(Error::IllegalDataAddress));
+/// assert_eq!(status.text(), Error::IllegalDataAddress.text());
+/// assert_eq!(Status::PENDING.poll(), Poll::Pending);
+/// assert!(Status::RESPONSE_TIMED_OUT.may_be_repeated());
+/// ```
 #[must_use = "it may be an error; `result()?` passes that on"]
 #[repr(transparent)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]

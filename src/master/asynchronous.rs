@@ -23,6 +23,24 @@ use embedded_io_async::{Read, Write};
 ///
 /// If the future of a request is dropped, the request is cancelled, and the driver is switched
 /// off. The next request can follow at once.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+/// use mbm::master::{AsyncMaster, Buffers};
+///
+/// async fn read() -> Result<[u16; 2], mbm::Error> {
+///     let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
+///     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
+///     master.settings().set_baud_rate(19200);
+///     let words = master.holding_registers(107).await?;
+///     assert_eq!(master.exception_code(), 0);
+///     assert_eq!(master.storage().counters[0], 1);
+///     master.set_unit(18);
+///     let _uart = master.device();
+///     Ok(words)
+/// }
+/// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+/// ```
 #[derive(Debug)]
 pub struct AsyncMaster<D, C, T, S: Words, E = fn(bool)> {
     master: Master<AsyncIo<D, C, T, E>, S>,
@@ -38,6 +56,20 @@ impl<D, C: FnMut() -> u32, T, S: Words> AsyncMaster<D, C, T, S> {
 impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> AsyncMaster<D, C, T, S, E> {
     /// As [`AsyncMaster::new`], with an RS-485 driver: `driver` switches it on with `true` before
     /// the first byte is sent, and off after the last one.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+    /// use mbm::master::{AsyncMaster, Buffers};
+    ///
+    /// async fn read() -> Result<[u16; 2], mbm::Error> {
+    ///     let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
+    ///     let driver = |on: bool| { /* Sets the pin of the driver. */ };
+    ///     let mut master = AsyncMaster::with_driver(17, uart(), micros, Delay, buffers, driver);
+    ///     master.settings().set_baud_rate(19200);
+    ///     master.holding_registers(107).await
+    /// }
+    /// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
+    /// ```
     pub const fn with_driver(
         unit: u8,
         device: D,

@@ -31,6 +31,36 @@ use node::Node;
 use request::Line;
 
 /// A serial line with one node, its port and its buffers.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// use mbm::master::{Buffers, Master};
+/// use mbm::Status;
+///
+/// let mut master = Master::new(17, rtu(), Buffers::new([0; 64], [0; 20], [0; 20]));
+/// master.settings().set_baud_rate(19200);
+/// let [flow, total] = master.holding_registers(107)?;
+/// assert_eq!((master.response(), master.status()), (&[555, 100][..], Status::OK));
+///
+/// // Without waiting: other work is done meanwhile, or the program sleeps.
+/// master.start_read_coils(0, 2)?;
+/// while master.is_pending() {
+///     let _ = master.poll();
+///     let sleep = master.poll_delay();
+///     if master.is_waiting() { /* It may sleep so long. */ }
+/// }
+/// assert!(master.response_bits().eq([true, false]));
+///
+/// master.set_unit(18);
+/// assert_eq!((master.unit(), master.exception_code()), (18, 0));
+/// master.set_lenient(true);
+/// master.port().is_silent = true;
+/// assert_eq!(master.holding_registers::<2>(107), Err(mbm::Error::ResponseTimedOut));
+/// assert_eq!(master.storage().counters[0], 3);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Hash, Debug)]
 pub struct Master<P, S: Words> {
     node: Node,
@@ -178,6 +208,18 @@ impl<P: Port, S: Words> Master<P, S> {
 
     /// Cancels the pending request, if there is one. Its status becomes
     /// [`Status::CANCELLED`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+    /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+    /// master.start_read_holding_registers(107, 2)?;
+    /// master.cancel();
+    /// assert_eq!(master.status(), mbm::Status::CANCELLED);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn cancel(&mut self) {
         if self.node.is_pending() {
             self.line.cancel();
@@ -209,6 +251,18 @@ impl<P: Port, S: Words> Master<P, S> {
     ///
     /// # Errors
     /// The error with which the request has ended.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+    /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+    /// master.start_read_holding_registers(107, 2)?;
+    /// master.wait(|| { /* The watchdog is fed here. */ })?;
+    /// assert_eq!(master.response(), [555, 100]);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn wait(&mut self, mut idle: impl FnMut()) -> Result<(), Error> {
         loop {
             if let Poll::Ready(result) = self.poll() {
@@ -268,33 +322,129 @@ impl<P: Port, S: Words> Master<P, S> {
     /// allow; [`Error::InvalidAddress`] for addresses beyond 65535;
     /// [`Error::BufferTooSmall`]; [`Error::BroadcastNotAllowed`];
     /// [`Error::NotInitialised`] if the port or the frame buffer cannot be used.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+    /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+    /// master.start_read_coils(0, 2)?;
+    /// while master.poll().is_pending() { /* Other work is done here. */ }
+    /// assert!(master.response_bits().eq([true, false]));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn start_read_coils(&mut self, address: u16, quantity: u16) -> Result<(), Error> {
         self.start(request!(READ_COILS, address, quantity))
     }
 
     requests! {
         /// 02: starts a request that reads 1 to 2000 discrete inputs into the response words.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_read_discrete_inputs(0, 2)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// assert!(master.response_bits().eq([false, true]));
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_read_discrete_inputs(address: u16, quantity: u16)
             => request!(READ_DISCRETE_INPUTS, address, quantity);
         /// 03: starts a request that reads 1 to 125 holding registers into the response words.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_read_holding_registers(107, 2)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// assert_eq!(master.response(), [555, 100]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_read_holding_registers(address: u16, quantity: u16)
             => request!(READ_HOLDING_REGISTERS, address, quantity);
         /// 04: starts a request that reads 1 to 125 input registers into the response words.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_read_input_registers(0, 2)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// assert_eq!(master.response(), [21, 22]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_read_input_registers(address: u16, quantity: u16)
             => request!(READ_INPUT_REGISTERS, address, quantity);
         /// 05: starts a request that switches one coil.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_write_single_coil(1, true)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// # assert!(master.port().units.device.values.coils.cells[1]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_write_single_coil(address: u16, on: bool)
             => |node: &mut Node, line| node.write_single_coil(line, address, on.into());
         /// 06: starts a request that writes one register.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_write_single_register(107, 888)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// # assert_eq!(master.port().units.device.values.holding_registers.cells[0], 888);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_write_single_register(address: u16, value: u16)
             => |node: &mut Node, line| node.write_single_register(line, address, value);
         /// 0F: starts a request that writes 1 to 1968 coils.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_write_multiple_coils(0, &[false, true])?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// # assert_eq!(master.port().units.device.values.coils.cells, [false, true]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_write_multiple_coils(address: u16, coils: &[bool])
             => |node: &mut Node, line| {
                 let quantity = put_bits(line, coils);
                 node.request(line, address, quantity, FunctionSpec::WRITE_MULTIPLE_COILS.short())
             };
         /// 10: starts a request that writes 1 to 123 registers.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_write_multiple_registers(109, &[7, 8])?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// # assert_eq!(master.port().units.device.values.holding_registers.cells[2..], [7, 8]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_write_multiple_registers(address: u16, words: &[u16])
             => |node: &mut Node, line| {
                 let quantity = put_words(line, words);
@@ -303,10 +453,35 @@ impl<P: Port, S: Words> Master<P, S> {
             };
         /// 16: starts a request that sets a register to
         /// `(register & and_mask) | (or_mask & !and_mask)`.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// // Sets bit 2, and leaves the others.
+        /// master.start_mask_write_register(107, 0xFFFB, 0x0004)?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// # assert_eq!(master.port().units.device.values.holding_registers.cells[0], 559);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_mask_write_register(address: u16, and_mask: u16, or_mask: u16)
             => |node: &mut Node, line| node.mask_write_register(line, address, and_mask, or_mask);
         /// 17: starts a request that writes 1 to 121 registers, then reads 1 to 125 into the response
         /// words.
+        ///
+        /// ```
+        /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+        /// # fn main() -> Result<(), mbm::Error> {
+        /// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+        /// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+        /// master.start_read_write_multiple_registers(107, 4, 109, &[7, 8])?;
+        /// while master.poll().is_pending() { /* Other work is done here. */ }
+        /// assert_eq!(master.response(), [555, 100, 7, 8]);
+        /// # Ok(())
+        /// # }
+        /// ```
         fn start_read_write_multiple_registers(
             read_address: u16, read_quantity: u16, write_address: u16, words: &[u16]
         ) => |node: &mut Node, line| {

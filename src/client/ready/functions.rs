@@ -13,6 +13,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut outputs = [0];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_exception_status(17, &mut outputs)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_exception_status(unit: u8, outputs: &'a mut [u8; 1]) -> Result<Self, Error> {
         let spec = FunctionSpec::READ_EXCEPTION_STATUS;
         Request::short(unit, spec, (0, 0), Slice::None, Slice::Bytes(outputs))
@@ -49,6 +61,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut words = [0; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::get_comm_event_counter(17, &mut words)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn get_comm_event_counter(unit: u8, words: &'a mut [u16; 2]) -> Result<Self, Error> {
         let spec = FunctionSpec::GET_COMM_EVENT_COUNTER;
         Request::short(unit, spec, (0, 0), Slice::None, Slice::Registers(words))
@@ -59,6 +83,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut log = [0; mbm::client::CommEventLog::BYTES];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::get_comm_event_log(17, &mut log)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn get_comm_event_log(unit: u8, log: &'a mut [u8]) -> Result<Self, Error> {
         let spec = FunctionSpec::GET_COMM_EVENT_LOG;
         Request::short(unit, spec, (0, 0), Slice::None, Slice::Bytes(log))
@@ -69,6 +105,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut id = [0; 250];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::report_server_id(17, &mut id)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn report_server_id(unit: u8, id: &'a mut [u8]) -> Result<Self, Error> {
         let spec = FunctionSpec::REPORT_SERVER_ID;
         Request::short(unit, spec, (0, 0), Slice::None, Slice::Bytes(id))
@@ -79,6 +127,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`]. The file numbers begin with 1, and the last record is 9999.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut records = [0; 3];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_file_record(17, 4, 7, &mut records)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_file_record(
         unit: u8,
         file: u16,
@@ -95,6 +155,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_file_record`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut records = [555, 100];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_file_record(17, 4, 7, &mut records)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_file_record(
         unit: u8,
         file: u16,
@@ -113,6 +185,20 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// [`Error::InvalidQuantity`] for a number of bytes that the standard does not allow.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// // Two records of file 4 from 7 on, and one of file 3.
+    /// let mut groups = [6, 0, 4, 0, 7, 0, 2, 6, 0, 3, 0, 9, 0, 1];
+    /// let mut records = [0; 250];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_file_records(17, &mut groups, &mut records)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_file_records(
         unit: u8,
         groups: &'a mut [u8],
@@ -129,6 +215,19 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_file_records`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// // Writes 555 into record 7 of file 4.
+    /// let mut groups = [6, 0, 4, 0, 7, 0, 1, 0x02, 0x2B];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_file_records(17, &mut groups)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_file_records(unit: u8, groups: &'a mut [u8]) -> Result<Self, Error> {
         let bytes = quantity(groups.len());
         Request::build(unit, Slice::Bytes(groups), Slice::None, |state| {
@@ -140,6 +239,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut queue = [0; 31];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_fifo_queue(17, 1000, &mut queue)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_fifo_queue(unit: u8, address: u16, queue: &'a mut [u16]) -> Result<Self, Error> {
         let spec = FunctionSpec::READ_FIFO_QUEUE;
         Request::short(
@@ -157,6 +268,20 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// use mbm::pdu::identification::DeviceIdCode;
+    ///
+    /// let mut objects = [0; 250];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_device_identification(17, DeviceIdCode::Basic, 0, &mut objects)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_device_identification(
         unit: u8,
         code: DeviceIdCode,
@@ -174,6 +299,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// [`Error::InvalidQuantity`] for more than 251 bytes.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let (mut data, mut takes) = ([1, 2], [0; 250]);
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::encapsulated_interface_transport(17, 0x0D, &mut data, &mut takes)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn encapsulated_interface_transport(
         unit: u8,
         mei_type: u8,
@@ -224,6 +361,19 @@ impl<'a> Request<'a> {
     /// # Errors
     /// [`Error::InvalidArgument`], [`Error::InvalidQuantity`] or [`Error::InvalidAddress`] for a
     /// request that no device could accept.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// // Reads two registers from 107 on.
+    /// let (mut body, mut takes) = ([0, 107, 0, 2], [0; 250]);
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::forward(17, 3, &mut body, &mut takes)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn forward(
         unit: u8,
         function: u8,

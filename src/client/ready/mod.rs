@@ -61,6 +61,25 @@ impl Slice<'_> {
 ///
 /// The slices of a request that writes are mutable too, so that the program can change the values
 /// before it queues the request again.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+/// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// let mut words = [0; 2];
+/// let mut request = Request::read_holding_registers(17, 107, &mut words)?;
+/// request.state.timeout_ms = 500;
+/// # let mut client: Client<_, Request, 4> = Client::new(line);
+/// client.queue(request)?;
+/// # let request = loop { let now = mbm::port::Port::micros(client.port()); if let Some(request) = client.poll(now) { break request; } };
+/// // When the client has returned it:
+/// assert_eq!(request.result(), Ok(()));
+/// assert_eq!(request.registers(), [555, 100]);
+/// client.queue(request)?; // Once more.
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Request<'a> {
     /// The unit, the timeout and the limit of retries, which you may set, and the outcome.
@@ -99,6 +118,18 @@ impl<'a> Request<'a> {
     /// # Errors
     /// This and the other constructors return [`Error::InvalidQuantity`] for a quantity that
     /// the standard does not allow; [`Error::InvalidAddress`] for addresses beyond 65535.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut coils = [false; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_coils(17, 0, &mut coils)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_coils(unit: u8, address: u16, coils: &'a mut [bool]) -> Result<Self, Error> {
         let words = (address, quantity(coils.len()));
         let spec = FunctionSpec::READ_COILS;
@@ -109,6 +140,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut inputs = [false; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_discrete_inputs(17, 0, &mut inputs)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_discrete_inputs(
         unit: u8,
         address: u16,
@@ -123,6 +166,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut registers = [0; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_holding_registers(17, 107, &mut registers)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_holding_registers(
         unit: u8,
         address: u16,
@@ -137,6 +192,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut registers = [0; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_input_registers(17, 0, &mut registers)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_input_registers(
         unit: u8,
         address: u16,
@@ -151,6 +218,17 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None: every address is allowed.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_single_coil(17, 0, true)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_single_coil(unit: u8, address: u16, on: bool) -> Result<Self, Error> {
         let words = (address, coil_value(on));
         let spec = FunctionSpec::WRITE_SINGLE_COIL;
@@ -161,6 +239,17 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None: every address is allowed.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_single_register(17, 107, 888)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_single_register(unit: u8, address: u16, value: u16) -> Result<Self, Error> {
         let spec = FunctionSpec::WRITE_SINGLE_REGISTER;
         Request::short(unit, spec, (address, value), Slice::None, Slice::None)
@@ -170,6 +259,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut coils = [true, false];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_multiple_coils(17, 0, &mut coils)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_multiple_coils(
         unit: u8,
         address: u16,
@@ -184,6 +285,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut registers = [888, 1];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::write_multiple_registers(17, 107, &mut registers)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn write_multiple_registers(
         unit: u8,
         address: u16,
@@ -198,6 +311,18 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// None: every address is allowed.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// // Sets bit 0, and leaves the others.
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::mask_write_register(17, 107, 0xFFFE, 0x0001)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn mask_write_register(
         unit: u8,
         address: u16,
@@ -213,6 +338,19 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// As [`Request::read_coils`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let (mut read, mut write) = ([0; 2], [7, 8]);
+    /// let (read, write) = ((107, &mut read[..]), (109, &mut write[..]));
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_write_multiple_registers(17, read, write)?)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn read_write_multiple_registers(
         unit: u8,
         (read_address, read): (u16, &'a mut [u16]),
@@ -244,6 +382,21 @@ impl<'a> Request<'a> {
 
     /// The coils or discrete inputs that were read; none if the request reads others or has
     /// failed.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut coils = [false; 2];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_coils(17, 0, &mut coils)?)?;
+    /// # let request = loop { let now = mbm::port::Port::micros(client.port()); if let Some(request) = client.poll(now) { break request; } };
+    /// // When the client has returned it:
+    /// assert_eq!(request.coils(), [true, false]);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn coils(&self) -> &[bool] {
         match &self.takes {
             Slice::Coils(coils) if self.state.length > 0 => coils,
@@ -252,6 +405,21 @@ impl<'a> Request<'a> {
     }
 
     /// The bytes that a request has received whose data are bytes; none for one that has failed.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut outputs = [0];
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(Request::read_exception_status(17, &mut outputs)?)?;
+    /// # let request = loop { let now = mbm::port::Port::micros(client.port()); if let Some(request) = client.poll(now) { break request; } };
+    /// // When the client has returned it:
+    /// assert_eq!(request.bytes(), [0b0000_0101]);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn bytes(&self) -> &[u8] {
         match &self.takes {
             Slice::Bytes(bytes) => bytes.get(..usize::from(self.state.length)),
@@ -261,6 +429,20 @@ impl<'a> Request<'a> {
     }
 
     /// The registers that the request writes.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut registers = [1, 2];
+    /// let mut request = Request::write_multiple_registers(17, 107, &mut registers)?;
+    /// request.registers_to_write()[0] = 7;
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(request)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn registers_to_write(&mut self) -> &mut [u16] {
         match &mut self.sends {
             Slice::Registers(words) => words,
@@ -269,6 +451,20 @@ impl<'a> Request<'a> {
     }
 
     /// The coils that the request writes.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut coils = [true, false];
+    /// let mut request = Request::write_multiple_coils(17, 0, &mut coils)?;
+    /// request.coils_to_write()[1] = true;
+    /// # let mut client: Client<_, Request, 4> = Client::new(line);
+    /// client.queue(request)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn coils_to_write(&mut self) -> &mut [bool] {
         match &mut self.sends {
             Slice::Coils(coils) => coils,

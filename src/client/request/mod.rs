@@ -40,6 +40,33 @@ pub(super) enum Stage {
 /// caller sets `capacity`, `transaction` and `unit`, and calls the function that makes the request,
 /// such as [`RequestState::set`], before it queues the request. It reads `status`, `exception` and
 /// `length` when the request has ended. The data stay in the caller's memory.
+///
+/// ```
+/// use mbm::client::RequestState;
+/// use mbm::pdu::custom::Rule;
+/// use mbm::pdu::functions::FunctionSpec;
+/// use mbm::Status;
+///
+/// let mut state = RequestState::NONE;
+/// state.unit = 17;
+/// // Each function makes another request of the state, unless the standard does not allow it.
+/// assert_eq!(state.set(FunctionSpec::READ_HOLDING_REGISTERS, 107, 2), Status::OK);
+/// assert_eq!(state.mask_write_register(107, 0xFFFE, 1), Status::OK);
+/// assert_eq!(state.read_write_registers(107, 2, 109, 2), Status::OK);
+/// assert_eq!(state.diagnostics(0, 2), Status::OK);
+/// assert_eq!(state.read_file_record(4, 7, 3), Status::OK);
+/// assert_eq!(state.write_file_record(4, 7, 3), Status::OK);
+/// assert_eq!(state.read_file_records(14), Status::OK);
+/// assert_eq!(state.write_file_records(9), Status::OK);
+/// assert_eq!(state.read_device_identification(1, 0), Status::OK);
+/// assert_eq!(state.encapsulated(0x0D, 2), Status::OK);
+/// assert_eq!(state.custom(65, 3, Rule::Fixed(4)), Status::OK);
+/// assert_eq!(state.forward(3, &[0, 107, 0, 2]), Status::OK);
+/// assert_eq!(state.unit(), 17);
+/// // A client answers, sends and ends it.
+/// assert!(state.has_reply() && !state.is_sent() && !state.has_ended());
+/// assert_eq!(state.wire(), 0);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct RequestState {
@@ -185,6 +212,38 @@ impl RequestState {
 }
 
 /// A request that the caller queues, and that the client returns when it has ended.
+///
+/// ```
+/// use mbm::client::{ClientRequest, RequestState};
+///
+/// /// A read whose registers the program keeps in the order of the wire.
+/// struct Values {
+///     state: RequestState,
+///     bytes: [u8; 4],
+/// }
+///
+/// impl ClientRequest for Values {
+///     fn state(&self) -> &RequestState {
+///         &self.state
+///     }
+///
+///     fn state_mut(&mut self) -> &mut RequestState {
+///         &mut self.state
+///     }
+///
+///     fn byte(&self, _: usize) -> u8 {
+///         0 // A read sends no data.
+///     }
+///
+///     fn store(&mut self, data: &[u8], _: u8) {
+///         self.bytes[..data.len()].copy_from_slice(data);
+///     }
+///
+///     fn wants_data(&self) -> bool {
+///         true
+///     }
+/// }
+/// ```
 pub trait ClientRequest {
     /// The state of the request.
     fn state(&self) -> &RequestState;
@@ -243,6 +302,21 @@ pub(super) fn data_of<J: ClientRequest>(request: &J) -> impl Fn(usize) -> u8 + '
 
 /// A request that [`Client::queue`](super::Client::queue) has refused, and hands back. In a
 /// function that returns [`Error`], `?` passes the reason on and drops the request.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+/// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// let mut client: Client<_, Request, 1> = Client::new(line);
+/// client.queue(Request::write_single_coil(17, 3, true)?)?;
+/// // There is a place for one request.
+/// let refused = client.queue(Request::write_single_coil(17, 4, true)?).unwrap_err();
+/// assert_eq!(refused.error(), mbm::Error::QueueFull);
+/// let request = refused.0; // It can be queued again.
+/// # Ok(())
+/// # }
+/// ```
 pub struct Refused<J>(pub J);
 
 impl<J: ClientRequest> Refused<J> {

@@ -20,6 +20,19 @@ use rules::{Rules, Strict};
 
 /// A TCP stream. One request is in flight at a time, unless [`Tcp::set_in_flight`] allows more.
 /// Received bytes are in the frame buffer, bytes to send in [`ClientStorage::outgoing`].
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// use mbm::client::{Client, Request, Tcp, TcpBuffers};
+///
+/// let mut line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// // A server that takes several requests at once answers sooner.
+/// line.set_in_flight(16);
+/// let client: Client<_, Request, 16> = Client::new(line);
+/// # Ok(())
+/// # }
+/// ```
 #[repr(C)]
 #[derive(Debug)]
 pub struct Tcp<P, S> {

@@ -30,6 +30,22 @@ pub const ACCEPT_UNIT: u8 = 1;
 pub const ACCEPT_TRANSACTION: u8 = 2;
 
 /// A [`Tcp`] stream with settings for devices that deviate. Without a setting it behaves as [`Tcp`].
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// use mbm::client::{BlockingClient, TcpBuffers, TolerantTcp, ACCEPT_UNIT};
+///
+/// let mut line = TolerantTcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// line.set_accept(ACCEPT_UNIT);
+/// line.set_lenient(true);
+/// // The device needs 20 ms between two requests.
+/// line.set_message_wait(20_000);
+/// let mut client: BlockingClient<_> = BlockingClient::new(line);
+/// assert_eq!(client.holding_registers(17, 107), Ok([555, 100]));
+/// # Ok(())
+/// # }
+/// ```
 #[repr(C)]
 #[derive(Debug)]
 pub struct TolerantTcp<P, S> {
