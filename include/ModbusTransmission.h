@@ -90,12 +90,12 @@ public:
     void setDriverPins(ModbusDriverPin::Pin driver, ModbusDriverPin::Pin receiver,
                        uint8_t driverLevel = 1, uint8_t receiverLevel = 0)
     {
-        const uintptr_t first = ModbusDriverPin::of(driver, driverLevel != 0),
-                        second = ModbusDriverPin::of(receiver, receiverLevel == 0);
-        ModbusDriverPin::begin(first);
-        ModbusDriverPin::begin(second);
-        preTransmission(ModbusDriverPin::sendTwo, ModbusDriverPin::contextOf(first, second));
-        postTransmission(ModbusDriverPin::receiveTwo, ModbusDriverPin::contextOf(first, second));
+        const uintptr_t driving = ModbusDriverPin::of(driver, driverLevel != 0),
+                        receiving = ModbusDriverPin::of(receiver, receiverLevel == 0);
+        ModbusDriverPin::begin(driving);
+        ModbusDriverPin::begin(receiving);
+        preTransmission(ModbusDriverPin::sendTwo, ModbusDriverPin::contextOf(driving, receiving));
+        postTransmission(ModbusDriverPin::receiveTwo, ModbusDriverPin::contextOf(driving, receiving));
     }
 
     /** Sets a callback before each transmission (RS-485 driver on); nullptr for none. */

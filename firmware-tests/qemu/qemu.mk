@@ -5,6 +5,8 @@ BAREMETAL := examples/baremetal/Makefile
 MACHINES = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) machines)
 VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
+# The test kit for ports runs from the archives alone.
+PORT_QEMU_TEST := $(BUILD)/firmware/test_porttest
 # Needs no archive, so it runs once.
 RUST_QEMU_TEST := $(BUILD)/firmware/test_rust
 QEMU_TESTS := $(filter-out $(RUST_QEMU_TEST),$(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c)))
@@ -37,8 +39,10 @@ test-firmware-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 		scripts/build/archive $$($(MAKE) -s --no-print-directory -f $(BAREMETAL) mcu MACHINE=$$machine); \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine; \
 		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=serve; \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$machine PROGRAM=porttest; \
 	done
-	@set -e; for variant in $(VARIANTS); do $(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant; done
+	@set -e; for variant in $(VARIANTS); do for program in main porttest; do \
+		$(MAKE) -s --no-print-directory -f $(BAREMETAL) MACHINE=$$variant PROGRAM=$$program; done; done
 	@$(MAKE) -s --no-print-directory assembler
 	@set -e; \
 	build() { \
@@ -53,5 +57,5 @@ test-firmware-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, R
 	@$(MAKE) -s --no-print-directory $(QEMU_TESTS)
 	@$(MAKE) -s --no-print-directory test-firmware-rust
 	@MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
-	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(QEMU_TESTS)
+	@MBM_FIRMWARE=$(FROM_SOURCE) MBM_TEST_JOBS=1 MBM_TEST_SECONDS=1200 scripts/check/run-c-tests $(filter-out $(PORT_QEMU_TEST),$(QEMU_TESTS))
 	@echo "test-firmware-qemu: $(words $(MACHINES)) machines ($(MACHINES)) against libmodbus, server and client, and a bad wire; from archives, and from mbm.S"

@@ -2,8 +2,6 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
-#include <string.h>
-
 static uint16_t put_number(char *place, uint16_t space, uint32_t number)
 {
     char digits[10];

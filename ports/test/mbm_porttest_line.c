@@ -2,8 +2,6 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
-#include <string.h>
-
 /* Nothing has happened for so long: a check ends. Longer than any latency of an adapter. */
 #define PATIENCE 1000000u
 
@@ -18,6 +16,9 @@ enum { SPACE = 64 };
 #else
 enum { SPACE = 300 };
 #endif
+
+/* A byte that no read may change. */
+enum { UNTOUCHED = 0x5C };
 
 /* --- the bytes */
 
@@ -38,9 +39,8 @@ static void fill(mbm_portTest *test)
 /* The tested port sends. */
 passage mbm_portTest_sending(const mbm_portTest *test, uint16_t length)
 {
-    passage bytes;
+    passage bytes = {0};
 
-    memset(&bytes, 0, sizeof bytes);
     bytes.from = test->port;
     bytes.to = test->other != NULL ? test->other : test->isLooped ? test->port : NULL;
     bytes.length = length;
@@ -71,9 +71,10 @@ static int16_t take(mbm_portTest *test, const mbm_port *port, uint8_t *space, ui
 {
     int16_t count;
 
-    memset(space, 0x5C, SPACE);
+    space[capacity] = space[capacity + 1] = UNTOUCHED;
     count = port->read(port->context, space, capacity);
-    if (count <= (int16_t)capacity && space[capacity] == 0x5C && space[capacity + 1] == 0x5C)
+    if (count <= (int16_t)capacity && space[capacity] == UNTOUCHED &&
+        space[capacity + 1] == UNTOUCHED)
         return count;
     test->isOver = 1;
     SAY_NUMBERS(

@@ -15,7 +15,7 @@ SKETCHES_OF_MBM := $(filter-out $(wildcard $(addprefix firmware-tests/avr/sketch
 .PHONY: print-commands
 print-commands:
 	@$(MAKE) --no-print-directory --dry-run --always-make $(TIDY_PROGRAMS)
-	@for machine in $(TIDY_MACHINES); do for program in main serve; do \
+	@for machine in $(TIDY_MACHINES); do for program in main serve porttest; do \
 		$(MAKE) --no-print-directory --dry-run --always-make -f $(BAREMETAL) MACHINE=$$machine PROGRAM=$$program; done; done
 	@for file in $(wildcard firmware-tests/qemu/*.c); do echo "gcc $(QEMU_FLAGS) -c $$file -o $$file.o"; done
 	@for file in $(SKETCHES_OF_MBM); do echo "g++ -x c++ $(CXXFLAGS) $(WARNINGS) -Iinclude -Ic-tests/shim -include Arduino.h -c $$file -o $$file.o"; done

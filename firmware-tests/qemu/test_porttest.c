@@ -1,0 +1,87 @@
+/* The UARTs of ports/baremetal in the test kit for ports, on every machine that QEMU plays. A
+ * process returns each byte, as a wire from TX to RX does.
+ *
+ *     test_porttest [MACHINE...] */
+#define _GNU_SOURCE
+#include "machine.h"
+#include "pty.h"
+#include "test.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static const machine *board;
+static pty line;
+static pid_t wire;
+
+static void become_wire(void)
+{
+    uint8_t bytes[64];
+    ssize_t count;
+
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    while ((count = read(line.theirs, bytes, sizeof bytes)) > 0)
+        for (ssize_t sent = 0; sent < count;) {
+            ssize_t more = write(line.theirs, bytes + sent, (size_t)(count - sent));
+
+            if (more < 0)
+                _exit(1);
+            sent += more;
+        }
+    _exit(0);
+}
+
+static int start(void **state)
+{
+    pty_open(&line);
+    wire = fork();
+    if (wire == 0)
+        become_wire();
+    return wire < 0;
+}
+
+static int stop(void **state)
+{
+    kill(wire, SIGKILL);
+    waitpid(wire, NULL, 0);
+    pty_close(&line);
+    return 0;
+}
+
+static void the_port_passes(void **state)
+{
+    running r = machine_start(board, "porttest", line.ours);
+    run done = machine_finish(&r, 1);
+
+    print_message("%s:\n%s", board->name, done.console);
+    assert_true(done.ended);
+    assert_int_equal(done.code, 0);
+    assert_non_null(strstr(done.console, "the port passes"));
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_port_passes)};
+    int failed = 0, asked = 0, a;
+    unsigned m;
+
+    for (m = 0; m < machine_count; m++) {
+        int wanted = argc == 1;
+
+        for (a = 1; a < argc; a++)
+            wanted |= strcmp(argv[a], machines[m].name) == 0;
+        if (!wanted)
+            continue;
+        board = &machines[m];
+        alarm(300);
+        failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
+        asked++;
+    }
+    if (asked == 0)
+        fprintf(stderr, "test_porttest: no such machine\n");
+    return failed != 0 || asked == 0;
+}
