@@ -3,107 +3,20 @@
 
 #[path = "common/awaited.rs"]
 mod awaited;
+#[macro_use]
+#[path = "common/awaited_clients.rs"]
+mod awaited_clients;
 #[path = "common/frame.rs"]
 mod frame;
-#[path = "common/random.rs"]
-mod random;
 
-use awaited::{drop_when, poll, run, run_for, value, Delay, Link, Net, Socket, UNIT};
+use awaited::{drop_when, poll, run, run_for, value, Link, Net, Socket, UNIT};
+use awaited_clients::{io, stream, TIMEOUT};
 use frame::framed;
 use mbm::client::AsyncClient;
 use mbm::engine::MicrosSetting;
 use mbm::frame::Framing;
-use mbm::port::AsyncIo;
 use mbm::Error;
 use std::pin::pin;
-
-/// The response timeout of the clients.
-const TIMEOUT: u32 = 100_000;
-
-type Io = AsyncIo<Socket, Box<dyn FnMut() -> u32>, Delay, Box<dyn FnMut(bool)>>;
-
-/// The port of a link. A stream has no driver.
-fn io(link: &Link) -> Io {
-    let (socket, delay) = (Socket(link.clone()), Delay(link.clone()));
-    let (clock, driver) = (link.clone(), link.clone());
-    let clock = Box::new(move || clock.borrow().now);
-    let driver = Box::new(move |on| driver.borrow_mut().driver = on);
-    AsyncIo::serial_with_driver(socket, clock, delay, driver)
-}
-
-type Stream = AsyncIo<Socket, Box<dyn FnMut() -> u32>, Delay>;
-
-fn stream(link: &Link) -> Stream {
-    let clock = link.clone();
-    let clock: Box<dyn FnMut() -> u32> = Box::new(move || clock.borrow().now);
-    AsyncIo::stream(Socket(link.clone()), clock, Delay(link.clone()))
-}
-
-/// A client whose calls end in 100 ms, on a serial line at 115 200 baud.
-macro_rules! ready {
-    ($client:expr) => {{
-        let mut client = $client;
-        client.settings().set_baud_rate(115_200);
-        client.settings().response_timeout = MicrosSetting::new(TIMEOUT);
-        client
-    }};
-}
-
-/// Does the same with a client of each framing that a stream carries.
-macro_rules! on_streams {
-    ($link:ident, $client:ident, $body:block) => {
-        for at in 0..3 {
-            match at {
-                0 => {
-                    let $link = Net::new(Framing::Tcp, false);
-                    #[allow(unused_mut)]
-                    let mut $client = ready!(AsyncClient::tcp(stream(&$link)));
-                    $body
-                }
-                1 => {
-                    let $link = Net::new(Framing::RtuOverTcp, false);
-                    #[allow(unused_mut)]
-                    let mut $client = ready!(AsyncClient::rtu_over_tcp(stream(&$link)));
-                    $body
-                }
-                _ => {
-                    let $link = Net::new(Framing::Ascii, false);
-                    #[allow(unused_mut)]
-                    let mut $client = ready!(AsyncClient::ascii(stream(&$link)));
-                    $body
-                }
-            }
-        }
-    };
-}
-
-/// Does the same with a client of each framing of a serial line.
-macro_rules! on_lines {
-    ($link:ident, $client:ident, $body:block) => {
-        for at in 0..2 {
-            match at {
-                0 => {
-                    let $link = Net::new(Framing::Rtu, true);
-                    let mut $client = ready!(AsyncClient::rtu(io(&$link)));
-                    $body
-                }
-                _ => {
-                    let $link = Net::new(Framing::Ascii, true);
-                    let mut $client = ready!(AsyncClient::ascii(io(&$link)));
-                    $body
-                }
-            }
-        }
-    };
-}
-
-/// Does the same with a client of each framing.
-macro_rules! on_each {
-    ($link:ident, $client:ident, $body:block) => {
-        on_streams!($link, $client, $body);
-        on_lines!($link, $client, $body);
-    };
-}
 
 #[test]
 fn registers_are_read_and_written_in_each_framing() {
@@ -531,104 +444,4 @@ fn a_request_that_the_standard_does_not_allow_is_refused_and_sends_nothing() {
         assert_eq!(refused, Err(Error::InvalidAddress));
         assert_eq!(link.borrow().sent, 0);
     });
-}
-
-/// What a life does to its link.
-#[derive(Clone, Copy)]
-enum Fault {
-    None,
-    Silent,
-    Late,
-    Slow,
-    Stuck,
-    Closed,
-    ReadError,
-    WriteError,
-}
-
-const FAULTS: [Fault; 10] = [
-    Fault::None,
-    Fault::None,
-    Fault::None,
-    Fault::Silent,
-    Fault::Late,
-    Fault::Slow,
-    Fault::Stuck,
-    Fault::Closed,
-    Fault::ReadError,
-    Fault::WriteError,
-];
-
-impl Net {
-    fn suffer(&mut self, fault: Fault, random: &mut random::Random) {
-        self.is_silent = false;
-        self.latency = 1_000 + random.below(20_000);
-        self.accepts = usize::MAX;
-        self.budget = usize::MAX;
-        match fault {
-            Fault::None => {}
-            Fault::Silent => self.is_silent = true,
-            Fault::Late => self.latency = random.below(2 * TIMEOUT - 10_000),
-            Fault::Slow => self.accepts = 1 + random.below(3) as usize,
-            Fault::Stuck => self.budget = random.below(20) as usize,
-            Fault::Closed => self.is_closed = true,
-            Fault::ReadError => self.read_fails = true,
-            Fault::WriteError => self.write_fails = true,
-        }
-    }
-}
-
-#[test]
-fn a_life_of_faults_and_dropped_futures_reads_only_right_values_and_always_again() {
-    for seed in random::seeds(60) {
-        on_each!(link, client, {
-            let random = &mut random::Random::new(seed);
-            for _ in 0..60 {
-                let fault = random.one_of(&FAULTS);
-                link.borrow_mut().suffer(fault, random);
-                for _ in 0..random.below(4) {
-                    let address = random.below(1000) as u16;
-                    let limit = match random.below(3) {
-                        0 => 10 * TIMEOUT,
-                        1 => random.below(2 * TIMEOUT),
-                        _ => random.below(3_000),
-                    };
-                    let read = client.holding_registers::<2>(UNIT, address);
-                    let read = run_for(&link, read, limit);
-                    assert!(
-                        !matches!(read, Some(Ok(_)))
-                            || read == Some(Ok([value(address), value(address + 1)])),
-                        "seed {seed}: {read:?}"
-                    );
-                    assert!(!link.borrow().driver, "seed {seed}");
-                    if read == Some(Err(Error::LinkLost)) {
-                        link.borrow_mut().reopen();
-                        client.reconnect();
-                    }
-                    link.borrow_mut().now += random.one_of(&[0, 0, 3_000, 300_000]);
-                }
-                if random.below(4) > 0 {
-                    continue;
-                }
-                // The link is well again.
-                link.borrow_mut().suffer(Fault::None, random);
-                link.borrow_mut().is_closed = false;
-                link.borrow_mut().write_fails = false;
-                let begun = link.borrow().now;
-                loop {
-                    let read = run(&link, client.holding_registers(UNIT, 7));
-                    if read.is_ok() {
-                        assert_eq!(read, Ok([value(7)]));
-                        break;
-                    }
-                    if read == Err(Error::LinkLost) {
-                        link.borrow_mut().reopen();
-                        client.reconnect();
-                    }
-                    let passed = link.borrow().now - begun;
-                    assert!(passed < 6 * TIMEOUT, "seed {seed}: {passed}: {read:?}");
-                }
-            }
-        });
-    }
 }

@@ -90,7 +90,12 @@ fn expected() -> String {
 fn two_registers_of_a_pymodbus_server_are_read_over_tcp_and_by_rtu_frames_in_tcp() {
     for (program, framing) in [
         (env!("CARGO_BIN_EXE_read_tcp"), "tcp"),
+        (env!("CARGO_BIN_EXE_read_tcp_async"), "tcp"),
         (env!("CARGO_BIN_EXE_read_rtu_over_tcp"), "rtu-over-tcp"),
+        (
+            env!("CARGO_BIN_EXE_read_rtu_over_tcp_async"),
+            "rtu-over-tcp",
+        ),
     ] {
         let server = Peer::pymodbus(framing, ["--port", "0"]);
         let address = format!("127.0.0.1:{}", server.words()[1]);
@@ -102,7 +107,9 @@ fn two_registers_of_a_pymodbus_server_are_read_over_tcp_and_by_rtu_frames_in_tcp
 fn two_registers_of_a_pymodbus_server_are_read_on_serial_lines() {
     for (program, framing) in [
         (env!("CARGO_BIN_EXE_read_rtu"), "rtu"),
+        (env!("CARGO_BIN_EXE_read_rtu_async"), "rtu"),
         (env!("CARGO_BIN_EXE_read_ascii"), "ascii"),
+        (env!("CARGO_BIN_EXE_read_ascii_async"), "ascii"),
     ] {
         let line = Peer::python(&[
             "-B",
@@ -118,9 +125,19 @@ fn two_registers_of_a_pymodbus_server_are_read_on_serial_lines() {
 fn two_registers_of_a_libmodbus_server_are_read_over_tcp_and_on_a_serial_line() {
     let server = Peer::start(&format!("{ROOT}/build/plain/serve_libmodbus"), &[]);
     let words = server.words();
-    assert_eq!(run(env!("CARGO_BIN_EXE_read_rtu"), words[1]), expected());
+    for program in [
+        env!("CARGO_BIN_EXE_read_rtu"),
+        env!("CARGO_BIN_EXE_read_rtu_async"),
+    ] {
+        assert_eq!(run(program, words[1]), expected());
+    }
     let address = format!("127.0.0.1:{}", words[2]);
-    assert_eq!(run(env!("CARGO_BIN_EXE_read_tcp"), &address), expected());
+    for program in [
+        env!("CARGO_BIN_EXE_read_tcp"),
+        env!("CARGO_BIN_EXE_read_tcp_async"),
+    ] {
+        assert_eq!(run(program, &address), expected());
+    }
 }
 
 #[test]
@@ -150,4 +167,23 @@ print(two.read_coils(0, count=1, device_id=17).exception_code)
         printed, "[555, 100, 0, 0]\n[100, 888, 999]\n2\n1\n",
         "{error}"
     );
+}
+
+#[test]
+fn two_tasks_share_a_connection_to_a_libmodbus_server() {
+    let server = Peer::start(&format!("{ROOT}/build/plain/serve_libmodbus"), &[]);
+    let address = format!("127.0.0.1:{}", server.words()[2]);
+    let printed = run(env!("CARGO_BIN_EXE_share_async"), &address);
+    let expected = expected();
+    let (first, second) = expected.split_once(' ').expect("two numbers");
+    for (register, value) in [(107, first), (108, second)] {
+        let line = format!("register {register} is {value}");
+        assert!(printed.lines().any(|printed| printed == line), "{printed}");
+    }
+    let is_right = |line: &str| {
+        line == format!("register 107 is {first}")
+            || line == format!("register 108 is {second}")
+            || line.ends_with("no reply in time")
+    };
+    assert!(printed.lines().all(is_right), "{printed}");
 }
