@@ -39,19 +39,19 @@
 //! # }
 //! ```
 //!
-//! On a serial line, as a future, with the feature `embedded-io-async`. `uart` is a UART of
-//! embedded-io-async, `Delay` is `DelayNs` of embedded-hal-async, which every executor's timer has:
+//! As a future, with the feature `embedded-io-async`. `socket` is a socket of embedded-io-async, `Delay`
+//! is `DelayNs` of embedded-hal-async, which every executor's timer has. On a serial line it is
+//! `AsyncClient::rtu(AsyncIo::serial(uart, micros, Delay))`:
 //!
 #![cfg_attr(feature = "embedded-io-async", doc = "```")]
 #![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
-//! use mbm::master::{AsyncMaster, Buffers};
+//! use mbm::client::AsyncClient;
+//! use mbm::port::AsyncIo;
 //!
 //! async fn read() -> Result<[u16; 2], mbm::Error> {
-//!     let buffers = Buffers::new([0; 64], [0; 20], [0; 20]);
-//!     let mut master = AsyncMaster::new(17, uart(), micros, Delay, buffers);
-//!     master.settings().set_baud_rate(19200);
-//!     master.holding_registers(107).await
+//!     let mut client = AsyncClient::tcp(AsyncIo::stream(socket(), micros, Delay));
+//!     client.holding_registers(17, 107).await
 //! }
 //! # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
 //! ```
@@ -81,9 +81,10 @@
 //! | you want | type |
 //! |---|---|
 //! | every function, on RTU, ASCII, TCP or RTU over TCP, in calls that wait | [`client::BlockingClient`] |
+//! | the same with futures | `client::AsyncClient` |
 //! | the same without waiting: many requests, queued, repeated, several in flight | [`client::Client`] with [`client::Request`] |
 //! | one RTU line in little memory, in calls that wait or with `poll` | [`master::Master`] |
-//! | the same with futures | `master::AsyncMaster` |
+//! | that with futures | `master::AsyncMaster` |
 //! | a server of your values | [`server::Server`] with a [`server::Device`] of yours, or with [`server::Tables`] |
 //! | values read at intervals | [`plan`] |
 //! | a gateway from TCP to lines | [`gateway`] |
@@ -219,7 +220,7 @@
 //! | feature | what it adds |
 //! |---|---|
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
-//! | `embedded-io-async` | `master::AsyncMaster`, a master with futures, over embedded-io-async and embedded-hal-async; `port::PolledIo`, a port over embedded-io-async |
+//! | `embedded-io-async` | `client::AsyncClient` and `master::AsyncMaster`, a client and a master with futures, over embedded-io-async and embedded-hal-async; `port::PolledIo`, a port over embedded-io-async |
 //! | `std` | `port::StdIo`, a port over a socket or serial port of the standard library |
 //! | `defmt` | `defmt::Format` for [`Status`], [`Error`] and [`Exception`] |
 

@@ -5,7 +5,7 @@ use mbm::client::AsyncClient;
 use mbm::port::AsyncIo;
 use mbm_host_example::{micros, open_line, Delay};
 
-#[tokio::main(flavor = "current_thread")]
+#[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args()
         .nth(1)

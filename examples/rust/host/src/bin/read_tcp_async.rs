@@ -6,7 +6,7 @@ use mbm::port::AsyncIo;
 use mbm_host_example::{micros, Delay};
 use tokio::net::TcpStream;
 
-#[tokio::main(flavor = "current_thread")]
+#[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let address = std::env::args()
         .nth(1)
