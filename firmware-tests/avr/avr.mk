@@ -47,7 +47,7 @@ ARDUINO_EXAMPLES := $(notdir $(wildcard examples/arduino/*))
 LARGE_EXAMPLES := Sniffer TcpToRtuGateway
 SMALL_EXAMPLES := $(filter-out $(LARGE_EXAMPLES),$(ARDUINO_EXAMPLES))
 # These need more than one UART.
-MEGA_SKETCHES := TwoPorts OlderCalls
+MEGA_SKETCHES := TwoPorts OlderCalls TestPorts
 TEST_SKETCHES := $(notdir $(wildcard firmware-tests/avr/sketches/*))
 AVR_ELFS := $(SMALL_EXAMPLES:%=$(AVR_OUT)/uno/%.elf) $(ARDUINO_EXAMPLES:%=$(AVR_OUT)/mega/%.elf) \
             $(SMALL_EXAMPLES:%=$(AVR_OUT)/leonardo/%.elf) $(AVR_OUT)/leonardo/UsbTypes.elf \

@@ -151,6 +151,9 @@ static void byte_out(struct avr_irq_t *irq, uint32_t value, void *parameter)
      * board's interrupt writes it, which another interrupt may delay. */
     if (follows)
         w->last_started = next;
+    /* In the simulator the UART has received the byte one byte time after this call. */
+    if (w->is_loop)
+        avr_raise_irq(w->end->in, value);
 }
 
 /* The simulator's bytes are always eleven bits long. Corrects that for other formats. */
@@ -199,6 +202,13 @@ wire *board_uart(board *b, char number, wire_device device, void *context)
     avr_irq_register_notify(
         avr_get_interrupt_irq(b->avr, w->end->uart->rxc.vector) + AVR_INT_IRQ_PENDING, received, w);
     return w;
+}
+
+static void ignore_frame(wire *w, const uint8_t *frame, size_t length) {}
+
+void board_loop(board *b, char number)
+{
+    board_uart(b, number, ignore_frame, NULL)->is_loop = 1;
 }
 
 /* --- the board's side: pins, bit by bit */

@@ -26,6 +26,7 @@ struct wire {
     uint64_t received;      /* when the board had received the last byte of a reply */
     unsigned bytes_received;
     /* private */
+    int is_loop;
     struct end *end;
     uint8_t frame[FRAME];
     size_t length;
@@ -41,6 +42,9 @@ void board_free(board *b);
 /* Connects a device to hardware UART `number`. The board's own divider gives the length of
  * a bit. A byte has ten bits. */
 wire *board_uart(board *b, char number, wire_device device, void *context);
+
+/* Wires TX of hardware UART `number` to its RX. */
+void board_loop(board *b, char number);
 
 /* Connects a device bit by bit: it reads the board's pin `port``tx` and drives `port``rx`. */
 wire *board_pins(board *b, char port, int rx, int tx, unsigned baud, wire_device device,

@@ -31,7 +31,7 @@ int is_high(board *b, pin p);
 
 /* The text that a sketch has printed. Zero before use. */
 typedef struct printed_text {
-    char text[2000];
+    char text[8000];
 } printed_text;
 
 /* For board_uart, with a printed_text as its context: appends what a sketch prints. */

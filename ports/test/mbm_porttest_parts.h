@@ -20,20 +20,20 @@ enum { NO_WAIT = 500 };
 /* Bytes on their way from one port to another, and what was seen of them. */
 typedef struct passage {
     const mbm_port *from;
-    const mbm_port *to;   /* NULL without a wire */
-    uint16_t length;      /* bytes to send */
-    uint8_t isAway;       /* 1: nothing is read until all were sent, as by a busy main loop */
-    uint8_t isFlushed;    /* flush has returned 1 */
-    uint8_t isDifferent;  /* a byte was not the next one that was sent */
-    uint8_t wanted;       /* that one */
-    uint8_t came;         /* the byte that came instead */
-    uint8_t next;         /* the byte that was sent after it */
-    uint8_t isComplement; /* it was what the buffer held after write had returned */
-    uint16_t taken;       /* bytes that write took */
-    uint16_t atOnce;      /* the most of them in one call */
-    uint16_t arrived;     /* bytes that read returned */
-    uint16_t right;       /* of these, before the first that was different */
-    uint16_t block;       /* bytes that arrived at once, at the end */
+    const mbm_port *to;  /* NULL without a wire */
+    uint16_t length;     /* bytes to send */
+    uint8_t isAway;      /* 1: nothing is read until all were sent, as by a busy main loop */
+    uint8_t isFlushed;   /* flush has returned 1 */
+    uint8_t isDifferent; /* a byte was not the next one that was sent */
+    uint8_t wanted;      /* that one */
+    uint8_t came;        /* the byte that came instead */
+    uint8_t after;       /* and the one after that */
+    uint8_t hasAfter;
+    uint16_t taken;   /* bytes that write took */
+    uint16_t atOnce;  /* the most of them in one call */
+    uint16_t arrived; /* bytes that read returned */
+    uint16_t right;   /* of these, before the first that was different */
+    uint16_t block;   /* bytes that arrived at once, at the end */
     uint16_t longestBlock;
     uint32_t longestPauseUs; /* between two blocks */
     uint32_t longestWriteUs; /* of one call */

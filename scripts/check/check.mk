@@ -8,7 +8,7 @@ TIDY_PROGRAMS = $(TESTS:%=$(BUILD)/plain/%) $(SECURE) $(SERVE) $(PEERS) $(BUILD)
                 $(BENCH_CLIENT) $(BENCH_SERVER) $(BENCH_SNIFFER)
 TIDY_MACHINES = $(filter-out lx106 dc233c,$(MACHINES)) $(VARIANTS)
 # Not the sketches that use an AVR's own registers or libraries.
-SKETCHES_OF_MBM := $(filter-out $(wildcard $(addprefix firmware-tests/avr/sketches/,Time*/*.ino Soft/*.ino Silences/*.ino)), \
+SKETCHES_OF_MBM := $(filter-out $(wildcard $(addprefix firmware-tests/avr/sketches/,Time*/*.ino TestPorts/*.ino Soft/*.ino Silences/*.ino)), \
                    $(wildcard examples/arduino/*/*.ino firmware-tests/avr/sketches/*/*.ino))
 
 # The commands that compile these files, and for sketches those with the stand-in for a core.

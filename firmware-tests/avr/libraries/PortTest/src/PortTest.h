@@ -1,0 +1,2 @@
+/* The test kit for ports. */
+#include "../../../../../ports/test/mbm_porttest.h"

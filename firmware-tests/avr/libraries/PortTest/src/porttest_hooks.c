@@ -1,0 +1,2 @@
+/* A source of the test kit for ports. */
+#include "../../../../../ports/test/mbm_porttest_hooks.c"
