@@ -101,7 +101,7 @@ header: ## Generate include/mbm.h and its parts from the source
 FEATURES := defmt,embedded-io,embedded-io-async
 # The others need another target, or compile C first, or the standard library, with which the archive
 # does not compile.
-LINTED := --workspace --exclude mbm-example --exclude mbm-bench --exclude mbm-host-example
+LINTED := --workspace --exclude mbm-example --exclude mbm-embassy-example --exclude mbm-bench --exclude mbm-host-example
 .PHONY: check
 check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header, docs, functions, spelling, symbols
 	@$(CARGO) fmt --all --check

@@ -32,7 +32,7 @@ PURPOSES = [
     (None, [f"--package={SHIPPED}", "--edges=normal"]),
     ("tests", ["--package=mbm", "--package=mbm-c", "--package=mbm-tools"]),
     ("features of the crate", ["--package=mbm", "--all-features"]),
-    ("an example", ["--package=mbm-example"]),
+    ("an example", ["--package=mbm-example", "--package=mbm-embassy-example"]),
     ("fuzzing", ["--package=mbm-fuzz", "--all-features"]),
     ("benchmarks", ["--package=mbm-bench"]),
     ("model checking", ["--package=mbm-model"]),

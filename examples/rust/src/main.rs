@@ -4,9 +4,11 @@
 #![no_main]
 
 mod board;
+mod console;
 mod uart;
 
-use board::{micros, Console, Delay};
+use board::{micros, Delay};
+use console::Console;
 use core::fmt::Write;
 use core::future::Future;
 use core::pin::pin;
@@ -61,5 +63,5 @@ fn main() -> ! {
     board::start();
     uart::start(BAUD);
     let failed = print("blocking", read_blocking()) + print("awaited", block_on(read_awaited()));
-    board::exit(failed)
+    console::exit(failed)
 }
