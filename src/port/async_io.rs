@@ -25,7 +25,7 @@ enum Outgoing {
     Stuck,
 }
 
-/// A [`Port`] over a device that is awaited, for clients whose functions are futures:
+/// A [`Port`] over a device that is awaited, for clients and servers whose functions are futures:
 ///
 /// ```
 /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
@@ -40,7 +40,7 @@ enum Outgoing {
 /// # fn main() { assert_eq!(block_on(read()), Ok([555, 100])); }
 /// ```
 ///
-/// Such a client awaits the device. For a client or server that is polled, the port receives nothing.
+/// They await the device. For a client or server that is polled, the port receives nothing.
 ///
 /// - `D` is the device: [`Read`] and [`Write`] of embedded-io-async. Its read must lose no byte if
 ///   its future is dropped, as a UART with a receive buffer does; and a socket must have sent none if
@@ -195,6 +195,24 @@ impl<D, C, T, E> AsyncIo<D, C, T, E> {
         self.outgoing == Outgoing::Stuck
     }
 
+    /// True if the link is lost.
+    pub(crate) fn is_lost(&self) -> bool {
+        self.is_lost
+    }
+
+    /// How many received bytes the core has not read.
+    pub(crate) fn unread(&self) -> usize {
+        self.end - self.start
+    }
+
+    /// The length of the frame that is being sent, and how many of its bytes the device has taken.
+    pub(crate) fn progress(&self) -> (u16, u16) {
+        match self.outgoing {
+            Outgoing::Frame { length, sent } => (length, sent),
+            Outgoing::None | Outgoing::Stuck => (0, 0),
+        }
+    }
+
     /// The length of the frame that the core has written and that is to be sent; `None` if there is
     /// none.
     pub(crate) fn frame_length(&self) -> Option<u16> {
@@ -293,6 +311,13 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
             // A device that fails at once again must not keep other tasks from running.
             Some(Err(_)) => self.timer.delay_us(delay.min(PAUSE)).await,
             None => {}
+        }
+    }
+
+    /// Waits for `delay` microseconds after a frame was sent.
+    pub(crate) async fn hold(&mut self, delay: u32) {
+        if delay > 0 && !self.is_lost && !self.is_stuck() {
+            self.timer.delay_us(delay).await;
         }
     }
 

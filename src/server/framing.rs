@@ -123,12 +123,13 @@ impl<P: Port> Server<P, [u8; 513]> {
     /// ```
     /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/requests.rs"));
     /// # fn main() {
-    /// # let port = requests(b":1106006D03780C\r\n");
+    /// # let port = requests(b":1106006D037801\r\n");
     /// # let tables = mbm::server::Tables::NONE.with_holding_registers(109, [0]);
     /// # let mut unit = mbm::server::Unit::new(17, tables);
     /// let mut server = mbm::server::Server::ascii(port);
     /// let lost = server.run(&mut unit);
     /// # assert_eq!(lost, mbm::Error::LinkLost);
+    /// # assert_eq!(unit.device.holding_registers.cells, [888]);
     /// # }
     /// ```
     pub const fn ascii(port: P) -> Self {

@@ -27,7 +27,7 @@ const FIFO_TIMEOUT: usize = 10;
 
 /// The length of a character in microseconds while the baud rate is unknown: a little more than
 /// that at 9600 baud, so no rate in use has it. (A number of few bits takes less flash.)
-const UNKNOWN_CHARACTER: u16 = 1_152;
+pub(super) const UNKNOWN_CHARACTER: u16 = 1_152;
 
 /// The storage of a server: the frame buffer of [`Storage`], which holds a request, then its
 /// response, and more that is optional.
@@ -294,6 +294,18 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         }
     }
 
+    /// As [`Server::look`]. `has` says which units the server has: see [`Units::has`].
+    #[inline(always)]
+    pub(super) fn look_for(&mut self, now: u32, has: &impl Fn(u8) -> bool) -> Status {
+        let (was_waiting, deadline) = (self.is_waiting, self.deadline);
+        let status = self.look(now);
+        if was_waiting || !self.is_waiting {
+            return status;
+        }
+        (self.is_waiting, self.deadline) = (false, deadline);
+        self.end_of_block(&|_, unit| has(unit))
+    }
+
     /// The second half of [`Server::poll`]: sends the response, if there is one.
     // For the C API; it may change in any version.
     #[doc(hidden)]
@@ -450,13 +462,7 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// # Errors
     /// As [`Server::poll`].
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Result<(), Error> {
-        let (was_waiting, deadline) = (self.is_waiting, self.deadline);
-        let mut status = self.look(now);
-        if !was_waiting && self.is_waiting {
-            (self.is_waiting, self.deadline) = (false, deadline);
-            status = self.end_of_block(&|_, unit| units.has(unit));
-        }
-        match status {
+        match self.look_for(now, &|unit| units.has(unit)) {
             Status::PENDING => {
                 let info = self.request;
                 let reply = units.serve(&info, self.pdu());
@@ -550,10 +556,18 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
         status
     }
 
-    fn end_transmission(&mut self) {
+    pub(super) fn end_transmission(&mut self) {
         self.port.post_transmission();
         self.listen();
         self.wait_for(self.sent.into(), self.now);
+    }
+
+    /// Stops sending a response, of which no echo is expected.
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) fn give_up_response(&mut self) {
+        self.port.post_transmission();
+        self.listen();
+        self.sent = 0;
     }
 
     /// Drops the received bytes, and expects no echo any more.

@@ -12,6 +12,8 @@
 //! Checks come in the order of the standard (V1.1b3, clause 7): function, quantity, address,
 //! execution. A write is carried out completely or not at all.
 
+#[cfg(feature = "embedded-io-async")]
+mod asynchronous;
 pub mod custom;
 mod device;
 pub mod diagnostics;
@@ -31,6 +33,8 @@ mod tables;
 mod unit;
 mod units;
 
+#[cfg(feature = "embedded-io-async")]
+pub use asynchronous::{AsyncServer, AsyncUnits};
 pub use device::{Bits, BitsMut, Device};
 pub use framing::{respond, DELIMITER};
 pub use indication::Indication;

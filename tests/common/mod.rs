@@ -1,5 +1,8 @@
 //! Helpers that several tests use: a device, a simulated line, and a master.
 
+#[cfg(feature = "embedded-io-async")]
+#[allow(dead_code)]
+pub mod async_line;
 #[allow(dead_code)]
 pub mod device;
 pub mod frame;

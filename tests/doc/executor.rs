@@ -92,3 +92,50 @@ fn socket() -> Uart {
         arriving: &[],
     }
 }
+
+/// A UART or socket on which bytes arrive. The link is lost some time later.
+#[derive(Clone)]
+struct Wire {
+    arriving: &'static [u8],
+    sent: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,
+}
+
+#[allow(dead_code)]
+fn wire(arriving: &'static [u8]) -> Wire {
+    Wire { arriving, sent: Default::default() }
+}
+
+impl Wire {
+    #[allow(dead_code)]
+    fn sent(&self) -> Vec<u8> {
+        self.sent.lock().unwrap().clone()
+    }
+}
+
+impl embedded_io_async::ErrorType for Wire {
+    type Error = std::convert::Infallible;
+}
+
+impl embedded_io_async::Read for Wire {
+    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Self::Error> {
+        if self.arriving.is_empty() {
+            embedded_hal_async::delay::DelayNs::delay_ms(&mut Delay, 500).await;
+        }
+        let count = bytes.len().min(self.arriving.len());
+        let (now, later) = self.arriving.split_at(count);
+        bytes[..count].copy_from_slice(now);
+        self.arriving = later;
+        Ok(count)
+    }
+}
+
+impl embedded_io_async::Write for Wire {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
+        self.sent.lock().unwrap().extend(bytes);
+        Ok(bytes.len())
+    }
+
+    async fn flush(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
