@@ -12,7 +12,7 @@ mod frame;
 use awaited::{drop_when, poll, run, run_for, value, Link, Net, Socket, UNIT};
 use awaited_clients::{io, stream, TIMEOUT};
 use frame::framed;
-use mbm::client::AsyncClient;
+use mbm::client::{AsyncClient, Call, TcpBuffers, TolerantTcp, ACCEPT_TRANSACTION};
 use mbm::engine::MicrosSetting;
 use mbm::frame::Framing;
 use mbm::Error;
@@ -78,6 +78,27 @@ fn the_rest_of_a_frame_is_sent_also_if_several_futures_are_dropped_on_the_way() 
 }
 
 #[test]
+fn a_frame_that_a_uart_still_sends_when_its_future_is_dropped_is_not_run_into_by_the_next_one() {
+    for part in [3, 8] {
+        on_lines!(link, client, {
+            // At a low rate, a frame takes longer than the quiet time.
+            client.settings().quiet_time = MicrosSetting::new(1_000);
+            link.borrow_mut().flush_waits = true;
+            link.borrow_mut().budget = part;
+            let write = client.write_single_register(18, 3, 7);
+            drop_when(&link, write, |net| net.sent == part);
+            link.borrow_mut().budget = usize::MAX;
+            let sent = link.borrow().sent;
+            let read = run_for(&link, client.holding_registers::<1>(UNIT, 107), 90_000);
+            assert_eq!((read, link.borrow().sent), (None, sent));
+            link.borrow_mut().flush_waits = false;
+            let read = run(&link, client.holding_registers(UNIT, 107));
+            assert_eq!(read, Ok([value(107)]));
+        });
+    }
+}
+
+#[test]
 fn the_reply_to_a_frame_that_was_sent_late_is_not_delivered_to_the_next_request() {
     on_streams!(link, client, {
         link.borrow_mut().budget = 7;
@@ -90,6 +111,22 @@ fn the_reply_to_a_frame_that_was_sent_late_is_not_delivered_to_the_next_request(
         let read = run(&link, client.holding_registers(UNIT, 50));
         assert_eq!(read, Ok([value(50), value(51)]));
     });
+}
+
+#[test]
+fn the_reply_to_a_frame_that_was_sent_late_is_not_taken_by_a_client_that_accepts_any_transaction() {
+    let link = Net::new(Framing::Tcp, false);
+    let mut line = TolerantTcp::new(stream(&link), TcpBuffers::new([0; 260], [0; 260]));
+    assert!(line.set_accept(ACCEPT_TRANSACTION));
+    let mut client: AsyncClient<_> = ready!(AsyncClient::new(line));
+    link.borrow_mut().budget = 7;
+    let read = client.holding_registers::<2>(UNIT, 107);
+    drop_when(&link, read, |net| net.sent == 7);
+    link.borrow_mut().now += 10 * TIMEOUT;
+    link.borrow_mut().budget = usize::MAX;
+    link.borrow_mut().latency = 30_000;
+    let read = run(&link, client.holding_registers(UNIT, 50));
+    assert_eq!(read, Ok([value(50), value(51)]));
 }
 
 #[test]
@@ -444,4 +481,12 @@ fn a_request_that_the_standard_does_not_allow_is_refused_and_sends_nothing() {
         assert_eq!(refused, Err(Error::InvalidAddress));
         assert_eq!(link.borrow().sent, 0);
     });
+}
+#[test]
+fn the_future_of_a_call_does_not_hold_its_request() {
+    let link = Net::new(Framing::Tcp, false);
+    let mut client = ready!(AsyncClient::tcp(stream(&link)));
+    let future = client.holding_registers::<2>(UNIT, 107);
+    let size = std::mem::size_of_val(&future);
+    assert!(size < 2 * std::mem::size_of::<Call>(), "{size}");
 }

@@ -36,9 +36,10 @@ enum Fault {
     Closed,
     ReadError,
     WriteError,
+    Leaving,
 }
 
-const FAULTS: [Fault; 10] = [
+const FAULTS: [Fault; 11] = [
     Fault::None,
     Fault::None,
     Fault::None,
@@ -49,6 +50,7 @@ const FAULTS: [Fault; 10] = [
     Fault::Closed,
     Fault::ReadError,
     Fault::WriteError,
+    Fault::Leaving,
 ];
 
 impl Net {
@@ -57,6 +59,7 @@ impl Net {
         self.latency = 1_000 + random.below(20_000);
         self.accepts = usize::MAX;
         self.budget = usize::MAX;
+        self.flush_waits = false;
         match fault {
             Fault::None => {}
             Fault::Silent => self.is_silent = true,
@@ -66,6 +69,7 @@ impl Net {
             Fault::Closed => self.is_closed = true,
             Fault::ReadError => self.read_fails = true,
             Fault::WriteError => self.write_fails = true,
+            Fault::Leaving => self.flush_waits = true,
         }
     }
 }

@@ -366,6 +366,26 @@ fn a_request_that_is_dropped_while_it_is_sent_switches_the_driver_off() {
 }
 
 #[test]
+fn a_frame_that_the_uart_still_sends_when_its_future_is_dropped_is_not_run_into_by_the_next_one() {
+    let mut bench = Bench::new();
+    let mut master = master(&bench);
+    // At a low rate, a frame takes longer than the quiet time.
+    master.settings().quiet_time = MicrosSetting::new(1_000);
+    master.set_unit(18);
+    let write = master.write_multiple_registers(100, &[2; 100]);
+    bench.drop_when(write, |wire| wire.sent.len() == 209);
+    master.set_unit(17);
+    let mut write = pin!(master.write_single_register(100, 3));
+    while !bench.wire.borrow().is_flushed() {
+        assert!(poll(write.as_mut()).is_pending());
+        assert_eq!(bench.wire.borrow().sent.len(), 209);
+        bench.pass();
+    }
+    assert_eq!(bench.run(write), Ok(()));
+    assert_eq!(bench.device.holding[0], 3);
+}
+
+#[test]
 fn a_late_reply_to_a_dropped_request_is_not_taken_for_the_next_one() {
     let mut bench = Bench::new();
     let mut master = master(&bench);

@@ -4,7 +4,7 @@ use super::call::{
     take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
     CALL_BYTES,
 };
-use super::calls::{accessors, calls, example};
+use super::calls::{accessor, accessors, calls, example};
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
 use super::transaction::Serial;
@@ -17,6 +17,7 @@ use crate::pdu::identification::{DeviceIdCode, IdentificationReply};
 use crate::pdu::identification_stream::{Next, ObjectStream};
 use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
 use crate::port::{AsyncIo, Port};
+use core::future::Future;
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
 
@@ -38,9 +39,9 @@ use embedded_io_async::{Read, Write};
 /// A client has one request at a time. Tasks that share it do so by the mutex of their executor.
 ///
 /// If the future of a request is dropped, the request is cancelled, and the RS-485 driver is switched
-/// off. The next request can follow at once. A frame that a socket has taken in part is sent to its
-/// end before the next one: the device would take the rest for the beginning of that. A late reply to
-/// the request is not taken for the reply to another.
+/// off. Another request may follow at once. It waits until what a UART has taken of the frame has left,
+/// and sends what a socket has not taken: the device would take the rest for the beginning of the next
+/// frame. A late reply to the request is not taken for the reply to another.
 ///
 /// After [`Error::LinkLost`] on a stream all requests end with it, and are not sent, until the
 /// program has opened the link anew, and calls [`AsyncClient::reconnect`].
@@ -179,7 +180,12 @@ impl<L: Transport<Call<D>>, const D: usize> AsyncClient<L, D> {
         }
     }
 
-    accessors! {}
+    accessors! {
+        "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));
+# fn main() -> Result<(), mbm::Error> {
+# let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);
+# let mut client = mbm::client::AsyncClient::tcp(port);"
+    }
 }
 
 impl<L, U, C, T, E, const D: usize> AsyncClient<L, D>
@@ -220,25 +226,29 @@ where
     T: DelayNs,
     E: FnMut(bool),
 {
-    /// Sends a request, and returns it with the response once it has ended.
-    async fn call(&mut self, request: Call<D>) -> Result<Call<D>, Error> {
+    /// Sends a request, and returns it with the response once it has ended. It is queued before the
+    /// future is made, so that the future need not hold it.
+    fn call(&mut self, request: Call<D>) -> impl Future<Output = Result<Call<D>, Error>> {
         // A future that was forgotten, and not dropped, has left its request.
         let _ = self.client.cancel(|_| true);
-        self.client.queue(request)?;
-        self.client.port().begin();
-        let running = Running(&mut self.client);
-        // The device may answer a request whose frame is sent to its end only now.
-        if send(running.0).await {
-            let now = running.0.port().micros();
-            running.0.line.note_sent_late(now);
-        }
-        running.0.port().take_old_bytes().await;
-        loop {
-            let now = running.0.port().micros();
-            if let Some(ended) = running.0.poll(now) {
-                return ended.result();
+        let queued = self.client.queue(request).map_err(Error::from);
+        let running = queued.map(|()| Running(&mut self.client));
+        async {
+            let running = running?;
+            running.0.port().begin();
+            // The device may answer a request whose frame is sent to its end only now.
+            if send(running.0).await {
+                let now = running.0.port().micros();
+                running.0.line.note_sent_late(now);
             }
-            go_on(running.0, now).await;
+            running.0.port().take_old_bytes().await;
+            loop {
+                let now = running.0.port().micros();
+                if let Some(ended) = running.0.poll(now) {
+                    return ended.result();
+                }
+                go_on(running.0, now).await;
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use super::call::{
     take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
     CALL_BYTES,
 };
-use super::calls::{accessors, calls, example};
+use super::calls::{accessor, accessors, calls, example};
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
 use super::transaction::Serial;
@@ -184,11 +184,32 @@ impl<L: Transport<Call<D>>, const D: usize> BlockingClient<L, D> {
     }
 
     /// Call this after the link was opened anew: see [`Client::reconnect`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn read(client: &mut mbm::client::BlockingClient<TcpLine>) -> Result<[u16; 2], mbm::Error> {
+    /// match client.holding_registers(17, 107) {
+    ///     Err(mbm::Error::LinkLost) => {
+    ///         *client.port() = tcp();
+    ///         client.reconnect();
+    ///         client.holding_registers(17, 107)
+    ///     }
+    ///     result => result,
+    /// }
+    /// # }
+    /// # fn main() {
+    /// #     let mut client = mbm::client::BlockingClient::tcp(tcp());
+    /// #     assert_eq!(read(&mut client), Ok([555, 100]));
+    /// # }
+    /// ```
     pub fn reconnect(&mut self) {
         self.client.reconnect();
     }
 
-    accessors! {}
+    accessors! {
+        "# fn main() -> Result<(), mbm::Error> {
+    # let mut client = mbm::client::BlockingClient::tcp(tcp());"
+    }
 }
 
 impl<L: Transport<Call<D>, Port: Port>, const D: usize> BlockingClient<L, D> {

@@ -137,9 +137,11 @@ impl<P: Port, S: Storage, Q: Transaction<P, S>> Engine<P, S, Q> {
         place
     }
 
-    /// Notes that the last request, which was cancelled while it was sent, has left only now.
+    /// Notes that the last request, which was cancelled while it was sent, has left only now. None is
+    /// pending.
     pub fn note_sent_late(&mut self, now: u32) {
         self.now = now;
+        self.since = now;
         self.write_record(now);
     }
 

@@ -5,7 +5,7 @@ use super::Master;
 use crate::engine::{Settings, Words};
 use crate::error::Error;
 use crate::pdu::{quantity, MAX_READ_BITS, MAX_READ_REGISTERS};
-use crate::port::AsyncIo;
+use crate::port::{AsyncIo, Port};
 use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
@@ -22,7 +22,8 @@ use embedded_io_async::{Read, Write};
 ///   a call.
 ///
 /// If the future of a request is dropped, the request is cancelled, and the driver is switched
-/// off. The next request can follow at once.
+/// off. Another request may follow at once. It waits until what the UART has taken of the frame has
+/// left.
 ///
 /// ```
 /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
@@ -126,6 +127,11 @@ where
         // A future that was forgotten, and not dropped, has left its request.
         self.master.cancel();
         self.master.port().begin();
+        if send(&mut self.master).await {
+            let line = &mut self.master.line;
+            let now = line.port.micros();
+            line.note_sent_late(now);
+        }
         start(&mut self.master)?;
         let running = Running(&mut self.master);
         running.0.port().take_old_bytes().await;
@@ -159,6 +165,27 @@ impl<D, C: FnMut() -> u32, T, S: Words, E: FnMut(bool)> Drop for Running<'_, D, 
     }
 }
 
+/// Sends a frame, or what is left of it. False if there is none.
+async fn send<D, C, T, S, E>(master: &mut Master<AsyncIo<D, C, T, E>, S>) -> bool
+where
+    D: Read + Write,
+    C: FnMut() -> u32,
+    T: DelayNs,
+    S: Words,
+    E: FnMut(bool),
+{
+    let Some(length) = master.port().frame_length() else {
+        return false;
+    };
+    let line = &mut master.line;
+    let settings = &line.settings;
+    let characters = u32::from(settings.any_character()) << 8;
+    let limit = characters.saturating_add(settings.response_timeout.get());
+    let frame = line.storage.slice(0, length as u8);
+    line.port.send(frame, limit).await;
+    true
+}
+
 /// Waits until the next poll has something to do.
 async fn go_on<D, C, T, S, E>(master: &mut Master<AsyncIo<D, C, T, E>, S>)
 where
@@ -168,13 +195,8 @@ where
     S: Words,
     E: FnMut(bool),
 {
-    if let Some(length) = master.port().frame_length() {
-        let line = &mut master.line;
-        let settings = &line.settings;
-        let characters = u32::from(settings.any_character()) << 8;
-        let limit = characters.saturating_add(settings.response_timeout.get());
-        let frame = line.storage.slice(0, length as u8);
-        return line.port.send(frame, limit).await;
+    if send(master).await {
+        return;
     }
     let delay = master.poll_delay();
     if !master.is_waiting() {

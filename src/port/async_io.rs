@@ -3,7 +3,7 @@
 use super::Port;
 use crate::error::Error;
 use core::future::{poll_fn, ready, Future};
-use core::pin::pin;
+use core::pin::{pin, Pin};
 use core::task::Poll;
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
@@ -170,14 +170,18 @@ impl<D, C, T, E> AsyncIo<D, C, T, E> {
         }
     }
 
-    /// Begins a request, or what else the core may send. A serial line forgets the frame of a request
-    /// that was given up, and is tried again if it was lost. A stream keeps a frame that was sent in
-    /// part: its rest is to be sent before any other.
+    /// Begins a request, or what else the core may send. A serial line that was lost is tried again. If
+    /// the device has taken a part of the frame of a request that was given up, a stream keeps it, since
+    /// its rest is to be sent before any other. On a serial line that part is to leave: the frame that
+    /// follows must be a frame by itself.
     pub(crate) fn begin(&mut self) {
-        let is_part = matches!(self.outgoing, Outgoing::Frame { sent: 1.., .. });
-        if self.is_serial || !is_part {
-            self.outgoing = Outgoing::None;
-        }
+        self.outgoing = match self.outgoing {
+            Outgoing::Frame { length, sent } if sent > 0 => Outgoing::Frame {
+                length: if self.is_serial { sent } else { length },
+                sent,
+            },
+            _ => Outgoing::None,
+        };
         if self.is_serial {
             self.is_lost = false;
         }
@@ -253,7 +257,8 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
             if place.is_empty() {
                 return;
             }
-            match first(device.read(place), ready(())).await {
+            let read = first(pin!(device.read(place)), pin!(ready(()))).await;
+            match read {
                 Some(Ok(count)) => return self.note_received(count),
                 Some(Err(_)) => self.note_link(!self.is_serial),
                 None => return,
@@ -265,23 +270,26 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
     pub(crate) async fn send(&mut self, frame: &[u8], limit: u32) {
         let (device, outgoing) = (&mut self.device, &mut self.outgoing);
         // Not `write_all`, which panics if the device takes no byte.
-        let send = async {
-            while let Outgoing::Frame { length, sent } = *outgoing {
-                let rest = frame.get(sent.into()..length.into()).unwrap_or_default();
-                if rest.is_empty() {
-                    break;
+        let sent = first(
+            pin!(async {
+                while let Outgoing::Frame { length, sent } = *outgoing {
+                    let rest = frame.get(sent.into()..length.into()).unwrap_or_default();
+                    if rest.is_empty() {
+                        break;
+                    }
+                    let taken = device.write(rest).await?.min(rest.len()) as u16;
+                    if taken == 0 {
+                        return Ok(false);
+                    }
+                    let sent = sent + taken;
+                    *outgoing = Outgoing::Frame { length, sent };
                 }
-                let taken = device.write(rest).await?.min(rest.len()) as u16;
-                if taken == 0 {
-                    return Ok(false);
-                }
-                let sent = sent + taken;
-                *outgoing = Outgoing::Frame { length, sent };
-            }
-            device.flush().await?;
-            Ok::<_, D::Error>(true)
-        };
-        let sent = first(send, self.timer.delay_us(limit)).await;
+                device.flush().await?;
+                Ok::<_, D::Error>(true)
+            }),
+            pin!(self.timer.delay_us(limit)),
+        )
+        .await;
         self.outgoing = match sent {
             None if self.is_serial => Outgoing::Stuck,
             _ => Outgoing::None,
@@ -305,7 +313,8 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
         if place.is_empty() {
             return timer.delay_us(delay).await;
         }
-        match first(device.read(place), timer.delay_us(delay)).await {
+        let read = first(pin!(device.read(place)), pin!(timer.delay_us(delay))).await;
+        match read {
             Some(Ok(count)) => self.note_received(count),
             Some(Err(_)) if !self.is_serial => self.is_lost = true,
             // A device that fails at once again must not keep other tasks from running.
@@ -330,8 +339,10 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
 }
 
 /// The result of `future`; `None` if `timer` has ended before.
-async fn first<F: Future>(future: F, timer: impl Future<Output = ()>) -> Option<F::Output> {
-    let (mut future, mut timer) = (pin!(future), pin!(timer));
+async fn first<F: Future, T: Future<Output = ()>>(
+    mut future: Pin<&mut F>,
+    mut timer: Pin<&mut T>,
+) -> Option<F::Output> {
     poll_fn(|context| match future.as_mut().poll(context) {
         Poll::Ready(result) => Poll::Ready(Some(result)),
         Poll::Pending => timer.as_mut().poll(context).map(|()| None),
