@@ -15,6 +15,7 @@ use std::future::{pending, Future};
 use std::pin::pin;
 #[cfg(feature = "std")]
 use std::sync::{Arc, Mutex};
+#[cfg(feature = "std")]
 use std::task::Poll;
 
 const FRAMINGS: [Framing; 4] = [

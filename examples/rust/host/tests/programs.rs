@@ -2,7 +2,7 @@
 #![cfg(feature = "pymodbus")]
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../..");
 
@@ -10,6 +10,7 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../..");
 struct Peer {
     child: Child,
     line: String,
+    output: BufReader<ChildStdout>,
 }
 
 impl Peer {
@@ -24,13 +25,20 @@ impl Peer {
             .unwrap_or_else(|error| {
                 panic!("{program}: {error}; run `make venv build/plain/serve_libmodbus`")
             });
-        let mut line = String::new();
         let output = child.stdout.take().expect("the output");
-        BufReader::new(output).read_line(&mut line).expect("a line");
-        Peer {
+        let mut peer = Peer {
             child,
-            line: line.trim_end().into(),
-        }
+            line: String::new(),
+            output: BufReader::new(output),
+        };
+        peer.line = peer.next_line();
+        peer
+    }
+
+    fn next_line(&mut self) -> String {
+        let mut line = String::new();
+        self.output.read_line(&mut line).expect("a line");
+        line.trim_end().into()
     }
 
     fn python(arguments: &[&str]) -> Peer {
@@ -186,4 +194,131 @@ fn two_tasks_share_a_connection_to_a_libmodbus_server() {
             || line.ends_with("no reply in time")
     };
     assert!(printed.lines().all(is_right), "{printed}");
+}
+
+/// What a program in Python prints.
+fn python(script: &str, arguments: &[&str]) -> String {
+    let output = Command::new(format!("{ROOT}/build/venv/bin/python"))
+        .args(["-c", script])
+        .args(arguments)
+        .output()
+        .expect("Python runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Clients of pymodbus, by their arguments.
+const PYMODBUS: &str = "\
+import sys
+from pymodbus import FramerType
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+framer, place = FramerType(sys.argv[1]), sys.argv[2]
+def client():
+    if place.startswith('/'):
+        made = ModbusSerialClient(place, framer=framer, baudrate=19200)
+    else:
+        made = ModbusTcpClient('127.0.0.1', port=int(place), framer=framer)
+    assert made.connect()
+    return made
+";
+
+/// A client of libmodbus.
+const LIBMODBUS: &str = "\
+import ctypes, sys
+lib = ctypes.CDLL('libmodbus.so.5', use_errno=True)
+lib.modbus_new_rtu.restype = lib.modbus_new_tcp.restype = ctypes.c_void_p
+lib.modbus_strerror.restype = ctypes.c_char_p
+place = sys.argv[1].encode()
+made = lib.modbus_new_rtu(place, 19200, ctypes.c_char(b'N'), 8, 1) if place.startswith(b'/') else lib.modbus_new_tcp(b'127.0.0.1', int(place))
+line = ctypes.c_void_p(made)
+lib.modbus_set_slave(line, 17)
+lib.modbus_set_response_timeout(line, 5, 0)
+assert lib.modbus_connect(line) == 0
+def read(address, count):
+    words = (ctypes.c_uint16 * count)()
+    done = lib.modbus_read_registers(line, address, count, words)
+    print(list(words) if done == count else lib.modbus_strerror(ctypes.get_errno()).decode())
+def write(address, *values):
+    done = lib.modbus_write_registers(line, address, len(values), (ctypes.c_uint16 * len(values))(*values))
+    print('written' if done == len(values) else lib.modbus_strerror(ctypes.get_errno()).decode())
+";
+
+/// Two pseudo-terminals as one line.
+fn pty_pair() -> Peer {
+    Peer::python(&[
+        "-B",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pty_pair.py"),
+    ])
+}
+
+#[test]
+fn a_server_on_tokio_is_read_and_written_by_clients_of_pymodbus_and_libmodbus_over_tcp() {
+    let server = Peer::start(env!("CARGO_BIN_EXE_serve_tcp_async"), &["127.0.0.1:0"]);
+    let port = server.line.rsplit(':').next().expect("a port");
+    let script = "\
+one, two = client(), client()
+read = lambda client, address, count: client.read_holding_registers(address, count=count, device_id=17)
+print(read(one, 107, 4).registers)
+one.write_registers(109, [888, 999], device_id=17)
+print(read(two, 108, 3).registers, read(two, 108, 4).exception_code)
+";
+    let printed = python(&[PYMODBUS, script].concat(), &["socket", port]);
+    assert_eq!(printed, "[555, 100, 0, 0]\n[100, 888, 999] 2\n");
+    let script = "read(107, 4); write(110, 7); read(107, 4); read(108, 4)";
+    let printed = python(&[LIBMODBUS, script].concat(), &[port]);
+    assert_eq!(
+        printed,
+        "[555, 100, 888, 999]\nwritten\n[555, 100, 888, 7]\nIllegal data address\n"
+    );
+}
+
+#[test]
+fn a_server_of_rtu_frames_on_tokio_measures_for_each_client_of_pymodbus() {
+    let server = Peer::start(
+        env!("CARGO_BIN_EXE_serve_rtu_over_tcp_async"),
+        &["127.0.0.1:0"],
+    );
+    let port = server.line.rsplit(':').next().expect("a port");
+    let script = "\
+one, two = client(), client()
+read = lambda client, address: client.read_input_registers(address, count=1, device_id=17)
+print(read(one, 0).registers, read(two, 0).registers, read(one, 0).registers, read(two, 1).exception_code)
+";
+    let printed = python(&[PYMODBUS, script].concat(), &["rtu", port]);
+    assert_eq!(printed, "[201] [202] [203] 2\n");
+}
+
+#[test]
+fn a_server_on_a_serial_line_on_tokio_is_written_by_clients_of_libmodbus_and_pymodbus() {
+    let line = pty_pair();
+    let ends = line.words();
+    let mut server = Peer::start(env!("CARGO_BIN_EXE_serve_rtu_async"), &[ends[0]]);
+    let script = "read(0, 2); write(0, 1500); read(0, 2); write(0, 3001); write(1, 1); read(1, 2)";
+    let printed = python(&[LIBMODBUS, script].concat(), &[ends[1]]);
+    let refused = "Illegal data value\nIllegal data address\nIllegal data address\n";
+    assert_eq!(printed, format!("[0, 7]\nwritten\n[1500, 7]\n{refused}"));
+    let script = "\
+one = client()
+print(one.write_register(0, 2000, device_id=17).registers)
+print(one.read_holding_registers(0, count=2, device_id=17).registers)
+";
+    let printed = python(&[PYMODBUS, script].concat(), &["rtu", ends[1]]);
+    assert_eq!(printed, "[2000]\n[2000, 7]\n");
+    let speeds = [server.next_line(), server.next_line()];
+    assert_eq!(speeds, ["speed 1500", "speed 2000"]);
+}
+
+#[test]
+fn an_ascii_server_on_tokio_is_read_and_written_by_a_client_of_pymodbus() {
+    let line = pty_pair();
+    let ends = line.words();
+    let _server = Peer::start(env!("CARGO_BIN_EXE_serve_ascii_async"), &[ends[0]]);
+    let script = "\
+one = client()
+print(one.write_registers(109, [888, 999], device_id=17).isError())
+print(one.read_holding_registers(107, count=4, device_id=17).registers)
+";
+    let printed = python(&[PYMODBUS, script].concat(), &["ascii", ends[1]]);
+    assert_eq!(printed, "False\n[555, 100, 888, 999]\n");
 }
