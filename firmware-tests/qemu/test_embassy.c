@@ -1,14 +1,22 @@
 /* The firmware on embassy, examples/rust/embassy, on QEMU's board mps2-an500, against libmodbus. */
+#define _GNU_SOURCE
 #include "machine.h"
 #include "server.h"
 #include "test.h"
 
+#include <errno.h>
+#include <modbus.h>
 #include <unistd.h>
 
 enum { UNIT = 17, ROUNDS = 60 };
 
 static server peer;
 static run done;
+
+/* The server on embassy, and the client of libmodbus that reads it. */
+static running serving;
+static pty served;
+static modbus_t *reader;
 
 static const machine *board(void)
 {
@@ -93,6 +101,64 @@ static void a_client_polls_futures_and_sleeps_in_between(void **state)
     assert_int_equal(peer.mapping->tab_registers[35], 49);
 }
 
+static int start_server(void **state)
+{
+    pty_open(&served);
+    serving = machine_start(board(), "embassy-server", served.ours);
+    if (!machine_says(&serving, "serving"))
+        return -1;
+    reader = modbus_new_rtu(served.path, 115200, 'N', 8, 1);
+    if (!reader || modbus_set_slave(reader, UNIT) || modbus_connect(reader) ||
+        modbus_set_response_timeout(reader, 60, 0) || modbus_set_byte_timeout(reader, 60, 0))
+        return -1;
+    return 0;
+}
+
+static int stop_client(void **state)
+{
+    modbus_close(reader);
+    modbus_free(reader);
+    machine_finish(&serving, 0);
+    pty_close(&served);
+    return 0;
+}
+
+/* Returns the client after a pause. The standard requires t3.5 between a response and the next
+ * request, but libmodbus sends at once, and on a pty characters take no time. */
+static modbus_t *reader_after_pause(void)
+{
+    usleep(5000);
+    return reader;
+}
+
+static void a_server_answers_though_its_future_is_dropped_each_millisecond(void **state)
+{
+    uint16_t first = 0, words[4], i;
+
+    assert_int_equal(modbus_read_registers(reader_after_pause(), 107, 2, words), 2);
+    assert_int_equal(words[0], 555);
+    assert_int_equal(words[1], 100);
+    assert_int_equal(modbus_read_input_registers(reader_after_pause(), 0, 1, &first), 1);
+    for (i = 0; i < 200; i++) {
+        assert_int_equal(modbus_write_register(reader_after_pause(), 109, i), 1);
+        assert_int_equal(modbus_read_registers(reader_after_pause(), 107, 4, words), 4);
+        assert_int_equal(words[0], 555);
+        assert_int_equal(words[2], i);
+    }
+    /* The milliseconds in which the future was dropped. */
+    assert_int_equal(modbus_read_input_registers(reader_after_pause(), 0, 1, words), 1);
+    assert_int_not_equal(words[0], first);
+}
+
+static void a_server_refuses_registers_that_it_does_not_have(void **state)
+{
+    uint16_t words[2];
+
+    assert_int_equal(modbus_read_registers(reader_after_pause(), 110, 2, words), -1);
+    assert_int_equal(errno, EMBXILADD);
+    assert_int_equal(modbus_read_registers(reader_after_pause(), 109, 2, words), 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest master[] = {
@@ -104,11 +170,16 @@ int main(void)
         cmocka_unit_test(the_firmware_ends_without_an_error),
         cmocka_unit_test(a_client_polls_futures_and_sleeps_in_between),
     };
+    const struct CMUnitTest serves[] = {
+        cmocka_unit_test(a_server_answers_though_its_future_is_dropped_each_millisecond),
+        cmocka_unit_test(a_server_refuses_registers_that_it_does_not_have),
+    };
     int failed;
 
     /* In case all other time limits fail: ends this program, and QEMU with it. */
     alarm(300);
     failed = cmocka_run_group_tests_name("a master on embassy", master, run_master, stop_server);
     failed += cmocka_run_group_tests_name("a client on embassy", client, run_client, stop_server);
+    failed += cmocka_run_group_tests_name("a server on embassy", serves, start_server, stop_client);
     return failed;
 }
