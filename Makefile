@@ -260,20 +260,20 @@ $(filter-out $(patsubst %.d,%.o,$(wildcard $(OBJECTS:.o=.d))),$(OBJECTS)): witho
 define variant
 $(BUILD)/$(1)/%.o: c-tests/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(TEST_WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(TEST_WARNINGS) $$(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: c-tests/%.cpp
 	@mkdir -p $$(@D)
-	@$(3) $(DEPENDS) $(CXXFLAGS) $(4) $(TEST_WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(3) $(DEPENDS) $(CXXFLAGS) $(4) $(TEST_WARNINGS) $$(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/%.o: examples/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $$(MODBUS) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) $$(MODBUS) -c $$< -o $$@
 $(BUILD)/$(1)/cli/%.o: cli/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) $(TOOL_FLAGS) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) $(TOOL_FLAGS) -c $$< -o $$@
 $(BUILD)/$(1)/cli/page.o: cli/page.html
 $(BUILD)/$(1)/%.o: ports/%.c
 	@mkdir -p $$(@D)
-	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $(INCLUDES) -c $$< -o $$@
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
 $(BUILD)/$(1)/mbm: $(TOOL:%.c=$(BUILD)/$(1)/%.o) $(TOOL_PORTS:ports/%.c=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(TOOL_LIBS) -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
@@ -283,6 +283,8 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
+$(BUILD)/$(1)/test_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
+$(BUILD)/$(1)/test_stm32: INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
