@@ -423,6 +423,22 @@ TEST(a_port_with_an_interrupt_passes)
     says(MBM_PORT_FACT, "300 of 556 bytes were lost, and `lost` counted 300.");
 }
 
+TEST(a_port_passes_at_any_rate)
+{
+    static const uint32_t rates[] = {300, 1200, 19200, 115200};
+
+    for (unsigned i = 0; i < COUNT(rates); i++) {
+        model_uart uart = with_interrupt();
+
+        uart.baud = rates[i];
+        uart.callNs = rates[i] > 19200 ? 2000 : 20000;
+        run_right(uart, 1);
+        uart.fault = FLUSH_EARLY;
+        prepare(uart, 1);
+        assert_int_equal(mbm_portTest_run(&k.test), 1);
+    }
+}
+
 TEST(a_port_with_a_fifo_passes)
 {
     run_right(with_fifo(), 1);
@@ -461,6 +477,16 @@ TEST(a_port_over_usb_passes)
     says(MBM_PORT_FACT, "Bytes arrive in blocks of up to 64.");
     says(MBM_PORT_LEFT_OUT,
          "Whether `flush` is exact was not measured: set `baud`, if the line has a rate.");
+}
+
+TEST(a_line_that_holds_the_sender_back_loses_nothing)
+{
+    model_uart uart = over_usb();
+
+    uart.ring = 100;
+    uart.holdsBack = 1;
+    run_right(uart, 0);
+    says(MBM_PORT_FACT, "400 bytes at once were all held, or the line held the sender back.");
 }
 
 /* The driver is switched by the UART, which holds it for no longer than the last bit. */
@@ -577,14 +603,14 @@ TEST(a_kind_of_finding_has_a_name)
     assert_string_equal(mbm_portFinding_name(MBM_PORT_LEFT_OUT), "left out");
 }
 
-/* docs/port.md shows this output. */
+/* docs/port.md shows this output, with times of one run. */
 TEST(the_output_on_the_page)
 {
     static const char *const lines[] = {
-        "fact: `micros` moves in steps of 20 us.",
-        "wrong: `flush` returned 1 after 7500 us, and 8 characters last 8333: it must wait for the last bit. Ask for transmission complete, not for an empty register, FIFO or DMA.",
+        "fact: `micros` moves in steps of % us.",
+        "wrong: `flush` returned 1 after % us, and 8 characters last 8333: it must wait for the last bit. Ask for transmission complete, not for an empty register, FIFO or DMA.",
         "left out: The pin of a driver was not looked at: set `driver`, if there is one.",
-        "fact: Bytes arrive in blocks of up to 1, at most 184 us late: no setting of mbm needs a change.",
+        "fact: Bytes arrive in blocks of up to 1, at most % us late: no setting of mbm needs a change.",
         "advice: 299 of 556 bytes were lost, and no counter said so: count them (mbm_ring_lost does), and set `lost`.",
         "left out: The port was not begun a second time: set `begin`.",
         "left out: No error on the line was tried: set `disturb` to a function that makes one, such as a break.",
@@ -601,6 +627,7 @@ TEST(the_output_on_the_page)
 
         snprintf(line, sizeof line, "%s: %s", mbm_portFinding_name(heard.kinds[i]),
                  heard.sentences[i]);
-        assert_string_equal(line, lines[i]);
+        if (!is_like(line, lines[i]))
+            assert_string_equal(line, lines[i]);
     }
 }

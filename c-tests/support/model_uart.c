@@ -60,6 +60,10 @@ static void work(model_uart *m)
     const uint64_t one = character_ns(m);
 
     while (m->leavingCount > 0 && m->next <= m->now) {
+        if (m->holdsBack && m->wire->heldCount + m->wire->pendingCount >= m->wire->ring) {
+            m->next = m->now;
+            break;
+        }
         const uint16_t at = m->first;
 
         arrive(m->wire, m->fault == WRITE_KEEPS ? *m->kept[at] : m->leaving[at], m->next);

@@ -63,6 +63,7 @@ typedef struct model_uart {
     uint16_t block;     /* bytes that it hands over at once; 1: each */
     uint32_t idleChars; /* and after so many characters of silence */
     uint8_t ownDriver;  /* the UART switches the driver itself */
+    uint8_t holdsBack;  /* the sender waits while the receiver is full, as over USB and TCP */
     model_fault fault;
 
     uint64_t now, next; /* nanoseconds; the end of the character that leaves */

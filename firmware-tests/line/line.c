@@ -206,6 +206,11 @@ void line_drive(bool on)
     is_driving = on;
 }
 
+bool line_is_driving(void)
+{
+    return is_driving;
+}
+
 void line_end_after(unsigned wanted)
 {
     end_after = wanted;

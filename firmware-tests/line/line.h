@@ -39,6 +39,7 @@ uint16_t line_received(void);
 
 /* Switches the transceiver's driver. */
 void line_drive(bool on);
+bool line_is_driving(void);
 
 /* Called whenever a byte has left or arrived. The player of the operating system defines it. */
 void line_interrupt(void);

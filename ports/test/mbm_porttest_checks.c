@@ -2,9 +2,6 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
-/* A frame whose end is measured: of a few bytes. */
-enum { FEW = 8 };
-
 /* --- the end of a frame */
 
 /* A device may reply 3.5 characters after the last bit, and above 19200 baud 1750 us. */

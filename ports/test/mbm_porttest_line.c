@@ -5,9 +5,6 @@
 /* Nothing has happened for so long: a check ends. Longer than any latency of an adapter. */
 #define PATIENCE 1000000u
 
-/* A short frame, as most requests are. */
-enum { FEW = 8 };
-
 /* The most bytes of one read, and the space for them: a port that ignores `capacity` has some more.
  */
 enum { CAPACITY = 32 };
@@ -276,16 +273,22 @@ static uint8_t waits_for_bytes(const mbm_portTest *test, const passage *bytes, c
 static void move(mbm_portTest *test, passage *bytes)
 {
     const uint32_t now = mbm_portTest_now(test);
-    times when = {now, now, now, mbm_portTest_characters(test, bytes->length)};
+    /* Bytes that were taken leave one by one. */
+    const uint32_t lasts = mbm_portTest_characters(test, bytes->length),
+                   patience = PATIENCE + lasts;
+    times when = {now, now, now, lasts};
 
-    if (when.sure > 0)
+    if (lasts > 0)
         when.sure -= mbm_portTest_characters(test, 1) / 2;
-    while (!test->isOver && !is_done(bytes) && mbm_portTest_since(test, when.progress) < PATIENCE) {
+    while (!test->isOver && !is_done(bytes) && mbm_portTest_since(test, when.progress) < patience) {
         if (bytes->taken < bytes->length)
             send(test, bytes, &when);
         else if (!bytes->isFlushed && !waits_for_bytes(test, bytes, &when))
             end(test, bytes, &when);
         watch_driver(test, bytes, &when);
+        /* A line that holds the sender back waits for the reader. */
+        if (mbm_portTest_since(test, when.progress) > patience - PATIENCE / 2)
+            bytes->isAway = 0;
         if (!test->isOver && bytes->to != NULL && (!bytes->isAway || bytes->isFlushed))
             receive(test, bytes, &when);
         mbm_portTest_yield(test);

@@ -17,6 +17,9 @@
 /* Microseconds: the longest time that a hook may take in which it does not wait. */
 enum { NO_WAIT = 500 };
 
+/* A short frame, as most requests are. */
+enum { FEW = 8 };
+
 /* Bytes on their way from one port to another, and what was seen of them. */
 typedef struct passage {
     const mbm_port *from;
