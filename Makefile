@@ -112,6 +112,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 		$(CARGO) clippy --quiet --features $$feature -- -D warnings || exit 1; done
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --quiet --no-deps -p mbm --features std,$(FEATURES)
+	@CARGO="$(CARGO)" scripts/check/examples
 	@$(CARGO) test --quiet -p mbm-tools >/dev/null
 	@$(CARGO) run --quiet -p mbm-tools --bin layers
 	@$(CARGO) run --quiet -p mbm-tools --bin circles

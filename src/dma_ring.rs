@@ -32,6 +32,12 @@ const LAPS: Word = Word::MAX / LAP + 1;
 pub const MAX_STORAGE: usize = LAP as usize - (size_of::<Word>() != 1) as usize;
 
 /// What interrupt and reader know about the DMA.
+///
+/// ```
+/// use mbm::dma_ring::Positions;
+///
+/// static POSITIONS: Positions = Positions::new();
+/// ```
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Positions {
@@ -66,6 +72,27 @@ const fn place_of(position: Word) -> usize {
 
 /// A ring in storage of the caller, of at most [`MAX_STORAGE`] bytes. `R` returns the counter of
 /// the DMA: how many bytes it writes until it begins again at the front of the storage.
+///
+/// ```
+/// use mbm::dma_ring::{DmaRing, Positions};
+/// use std::sync::atomic::{AtomicU16, AtomicU8, Ordering};
+///
+/// static BYTES: [AtomicU8; 64] = [const { AtomicU8::new(0) }; 64];
+/// static POSITIONS: Positions = Positions::new();
+/// # static COUNTER: AtomicU16 = AtomicU16::new(64);
+/// // The counter of the DMA, a register of the chip: how many bytes are left until it begins again.
+/// let ring = DmaRing::new(&BYTES, &POSITIONS, || COUNTER.load(Ordering::Relaxed));
+///
+/// # BYTES[0].store(17, Ordering::Relaxed);
+/// # COUNTER.store(63, Ordering::Relaxed);
+/// // In the interrupts of the DMA, at the half and at the end:
+/// ring.note();
+/// // In `Port::read`, which the main loop calls:
+/// assert_eq!(ring.available(), 1);
+/// let mut bytes = [0; 8];
+/// assert_eq!((ring.read(&mut bytes), bytes[0]), (1, 17));
+/// assert_eq!(ring.lost(), 0);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DmaRing<'a, R> {
     bytes: &'a [AtomicU8],

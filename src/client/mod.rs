@@ -79,6 +79,8 @@ const WRITE_RETRY_DELAY: u32 = millis(1);
 /// # fn main() -> Result<(), mbm::Error> {
 /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
 /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+/// use mbm::port::Port;
+///
 /// let mut words = [0; 2];
 /// let mut client: Client<_, _, 4> = Client::new(line);
 /// client.settings().response_timeout.set_timeout(500)?;
@@ -88,8 +90,7 @@ const WRITE_RETRY_DELAY: u32 = millis(1);
 ///
 /// // In the main loop:
 /// # let ended = loop {
-/// let now = client.port().units.device.records[0].into(); // The time, by the clock of the program.
-/// # let now: u32 = now; let now = now + mbm::port::Port::micros(client.port());
+/// let now = client.port().micros(); // Or another clock.
 /// if let Some(request) = client.poll(now) {
 ///     request.result()?;
 ///     assert_eq!(request.registers(), [555, 100]);
@@ -124,6 +125,19 @@ impl<L, J, const N: usize> Client<L, J, N> {
     }
 
     /// Takes the line back after [`Client::suspend`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # use mbm::client::{Client, Request, Tcp, TcpBuffers};
+    /// # let line = Tcp::new(tcp(), TcpBuffers::new([0; 260], [0; 260]));
+    /// let mut client: Client<_, Request, 4> = Client::new(line);
+    /// assert!(client.suspend());
+    /// // Another object has used the line.
+    /// client.take_back();
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn take_back(&mut self) {
         self.queue.suspended = false;
     }
@@ -335,6 +349,8 @@ pub trait Transport<J> {
 
     /// The port, and the `length` bytes that it has accepted in its last write. They stay where they
     /// are until a later one.
+    // The client calls it.
+    #[doc(hidden)]
     fn accepted(&mut self, length: u16) -> (&mut Self::Port, &[u8]);
 
     /// Advances the requests to the time `now`, and returns one that has ended. `fresh` is
@@ -350,6 +366,8 @@ pub trait Transport<J> {
 
     /// Notes that the last request, which was cancelled while it was sent, has left only now: its
     /// unit may answer from now on.
+    // The client calls it.
+    #[doc(hidden)]
     fn note_sent_late(&mut self, now: u32) {
         let _ = now;
     }

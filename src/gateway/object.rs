@@ -16,6 +16,32 @@ pub(super) const PATH_UNAVAILABLE: u8 = 0x0A;
 pub(super) const TARGET_FAILED: u8 = 0x0B;
 
 /// A gateway.
+///
+/// ```
+/// use mbm::gateway::{Gateway, GatewayStorage};
+/// use mbm::Status;
+///
+/// // `GatewayStorage` shows a storage.
+/// fn step<S: GatewayStorage>(gateway: &mut Gateway<S>, is_new: bool) -> u32 {
+///     if is_new {
+///         gateway.open(0);
+///     }
+///     gateway.poll();
+///     if gateway.status(0) != Status::OK {
+///         gateway.close(0);
+///     }
+///     let is_busy = gateway.pending(0) > 0 || !gateway.is_reading(0);
+///     if is_busy { 0 } else { gateway.poll_delay() }
+/// }
+///
+/// fn begin<S: GatewayStorage>(storage: S) -> Gateway<S> {
+///     let mut gateway = Gateway::new(storage);
+///     gateway.set_max_pending(4);
+///     gateway.set_queue_time(2_000_000);
+///     gateway.reset();
+///     gateway
+/// }
+/// ```
 #[repr(C)]
 #[derive(Debug)]
 pub struct Gateway<S> {

@@ -10,6 +10,16 @@ pub const LOCAL: u8 = 0xFE;
 pub const UNIT_0: u16 = 0x100;
 
 /// A range of unit ids on TCP, and where requests for them go.
+///
+/// ```
+/// use mbm::gateway::{Destination, Route};
+///
+/// // Unit ids 11 to 19 on TCP are units 1 to 9 of line 0.
+/// let routes = [Route { first: 11, last: 19, line: 0, unit: 1 }];
+/// assert!(routes[0].is_valid(1));
+/// assert_eq!(Route::find(&routes, 12), Some(Destination { line: 0, unit: 2 }));
+/// assert_eq!(Route::find(&routes, 20), None);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Route {
@@ -25,6 +35,14 @@ pub struct Route {
 }
 
 /// Where a request goes.
+///
+/// ```
+/// use mbm::gateway::{Destination, Route};
+///
+/// // The ids on the line are those on TCP.
+/// let routes = [Route { first: 1, last: 247, line: 0, unit: 0 }];
+/// assert_eq!(Route::find(&routes, 17), Some(Destination { line: 0, unit: 17 }));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Destination {
     /// As [`Route::line`].

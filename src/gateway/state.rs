@@ -26,6 +26,14 @@ pub(super) const NONE: u16 = u16::MAX;
 
 /// A request and then its response. The bytes of both are in
 /// [`GatewayStorage::frame`](super::GatewayStorage::frame).
+///
+/// ```
+/// use mbm::gateway::Transaction;
+///
+/// // The memory of eight requests.
+/// let requests = [Transaction::FREE; 8];
+/// assert_eq!(requests[0].line(), None);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Transaction {
@@ -69,6 +77,14 @@ impl Transaction {
 }
 
 /// A connection, or a place for one.
+///
+/// ```
+/// use mbm::gateway::ConnectionState;
+///
+/// // Places for four connections.
+/// let connections = [ConnectionState::FREE; 4];
+/// assert!(!connections[0].is_open());
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct ConnectionState {
@@ -115,6 +131,12 @@ impl ConnectionState {
 }
 
 /// A line.
+///
+/// ```
+/// use mbm::gateway::LineState;
+///
+/// let lines = [LineState::NEW; 2];
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct LineState {

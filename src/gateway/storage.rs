@@ -10,6 +10,14 @@ use crate::error::Status;
 pub const NO_RESPONSE: u16 = u8::MAX as u16;
 
 /// The result of a request on its line.
+///
+/// ```
+/// use mbm::gateway::RequestResult;
+/// use mbm::Status;
+///
+/// // The device has answered with exception 02.
+/// let result = RequestResult { status: Status::ILLEGAL_DATA_ADDRESS, exception: 2, length: 0 };
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RequestResult {
     /// [`Status::PENDING`]; [`Status::OK`] after a reply; else why there is none.
@@ -23,6 +31,146 @@ pub struct RequestResult {
 
 /// The memory of a gateway, its connections, its lines and its own units. An index that the
 /// gateway passes is always less than the number of such items.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// use mbm::client::{BlockingClient, Call, Transport};
+/// use mbm::frame::tcp::MAX_FRAME;
+/// use mbm::gateway::*;
+/// use mbm::port::Port;
+/// use mbm::Status;
+///
+/// /// One connection, and one line, whose client waits for the answer.
+/// struct Memory<C, L> {
+///     connection: C,
+///     state: ConnectionState,
+///     client: BlockingClient<L>,
+///     line: LineState,
+///     request: Transaction,
+///     frame: [u8; MAX_FRAME],
+///     result: RequestResult,
+/// }
+///
+/// /// Every unit is on the line.
+/// const ROUTES: [Route; 1] = [Route { first: 1, last: 247, line: 0, unit: 0 }];
+///
+/// impl<C: Port, L: Transport<Call, Port: Port>> GatewayStorage for Memory<C, L> {
+///     fn request_count(&self) -> u16 {
+///         1
+///     }
+///     fn connection_count(&self) -> u8 {
+///         1
+///     }
+///     fn line_count(&self) -> u8 {
+///         1
+///     }
+///     fn routes(&self) -> &[Route] {
+///         &ROUTES
+///     }
+///     fn request(&mut self, _: u16) -> &mut Transaction {
+///         &mut self.request
+///     }
+///     fn frame(&mut self, _: u16) -> &mut [u8] {
+///         &mut self.frame
+///     }
+///     fn connection(&self, _: u8) -> &ConnectionState {
+///         &self.state
+///     }
+///     fn connection_mut(&mut self, _: u8) -> &mut ConnectionState {
+///         &mut self.state
+///     }
+///     fn line(&mut self, _: u8) -> &mut LineState {
+///         &mut self.line
+///     }
+///     fn read(&mut self, _: u8, _: u16, from: u16, until: u16) -> i16 {
+///         let place = &mut self.frame[from.into()..until.into()];
+///         self.connection.read(place).map_or(-1, |count| count as i16)
+///     }
+///     fn write(&mut self, _: u8, _: u16, from: u16, until: u16) -> i16 {
+///         let bytes = &self.frame[from.into()..until.into()];
+///         self.connection.write(bytes).map_or(-1, |count| count as i16)
+///     }
+///     fn now(&mut self, _: u8) -> u32 {
+///         self.connection.micros()
+///     }
+///     fn poll_line(&mut self, _: u8) -> Status {
+///         Status::OK // No request of the line is pending: the client has waited for its end.
+///     }
+///     fn line_delay(&mut self, _: u8) -> u32 {
+///         0
+///     }
+///     fn line_depth(&self, _: u8) -> u16 {
+///         1
+///     }
+///     fn line_places(&self, _: u8) -> u16 {
+///         1
+///     }
+///     fn rest(&mut self, _: u8, _: u8) -> u32 {
+///         0
+///     }
+///     fn is_ready(&self, _: u8) -> bool {
+///         true
+///     }
+///     fn forward(&mut self, _: u8, _: u16, unit: u8, length: u16) -> Status {
+///         let (head, body) = self.frame.split_at_mut(Self::BODY);
+///         let request = body.to_vec();
+///         let request = &request[..length.into()];
+///         self.result = match self.client.forward(unit, head[Self::BODY - 1], request, body) {
+///             Ok(answer) => {
+///                 let length = answer.len() as u16;
+///                 RequestResult { status: Status::OK, exception: 0, length }
+///             }
+///             Err(error) => RequestResult {
+///                 status: error.into(),
+///                 exception: error.exception().map_or(0, |exception| exception.code()),
+///                 length: 0,
+///             },
+///         };
+///         Status::PENDING
+///     }
+///     fn result(&mut self, _: u16) -> RequestResult {
+///         self.result
+///     }
+///     fn cancel(&mut self, _: u8, _: u16) {}
+///     fn serve(&mut self, _: u8, _: u16, _: u16) -> Option<u16> {
+///         Some(0) // No route is local.
+///     }
+/// }
+///
+/// # struct Connection { arrives: &'static [u8], left: Vec<u8> }
+/// # impl Port for Connection {
+/// #     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, mbm::Error> {
+/// #         let count = bytes.len().min(self.arrives.len());
+/// #         bytes[..count].copy_from_slice(&self.arrives[..count]);
+/// #         self.arrives = &self.arrives[count..];
+/// #         Ok(count)
+/// #     }
+/// #     fn write(&mut self, bytes: &[u8]) -> Result<usize, mbm::Error> {
+/// #         self.left.extend(bytes);
+/// #         Ok(bytes.len())
+/// #     }
+/// #     fn micros(&mut self) -> u32 {
+/// #         0
+/// #     }
+/// # }
+/// # fn main() {
+/// # let connection = Connection { arrives: &[0, 5, 0, 0, 0, 6, 17, 3, 0, 107, 0, 2], left: vec![] };
+/// let mut gateway = Gateway::new(Memory {
+///     connection,
+///     state: ConnectionState::FREE,
+///     client: BlockingClient::rtu(rtu()),
+///     line: LineState::NEW,
+///     request: Transaction::FREE,
+///     frame: [0; MAX_FRAME],
+///     result: RequestResult { status: Status::PENDING, exception: 0, length: 0 },
+/// });
+/// gateway.open(0);
+/// // In the main loop:
+/// gateway.poll();
+/// # for _ in 0..10 { gateway.poll(); }
+/// # assert_eq!(gateway.storage.connection.left, [0, 5, 0, 0, 0, 7, 17, 3, 4, 2, 43, 0, 100]);
+/// # }
+/// ```
 pub trait GatewayStorage {
     /// Index in a frame of the bytes after the function code.
     const BODY: usize = crate::frame::tcp::PDU + 1;

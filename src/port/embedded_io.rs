@@ -10,6 +10,23 @@ use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 ///
 /// `clock` returns the time in microseconds, which wraps at 2^32. The traits do not say when the last
 /// byte has left, so set the baud rate: `settings().set_baud_rate(..)`.
+///
+/// ```
+/// use embedded_io::{Read, ReadReady, Write, WriteReady};
+/// use mbm::client::BlockingClient;
+/// use mbm::port::EmbeddedIo;
+///
+/// fn read<U: Read + ReadReady + Write + WriteReady>(
+///     uart: U,
+///     micros: fn() -> u32,
+///     switch_driver: fn(bool),
+/// ) -> Result<[u16; 2], mbm::Error> {
+///     let port = EmbeddedIo::serial(uart, micros).with_driver(switch_driver, 19200);
+///     let mut client = BlockingClient::rtu(port);
+///     client.settings().set_baud_rate(19200);
+///     client.holding_registers(17, 107)
+/// }
+/// ```
 #[derive(Clone, Debug)]
 pub struct EmbeddedIo<D, C, E = fn(bool)> {
     /// The UART or socket.
@@ -38,6 +55,20 @@ impl<D, C> EmbeddedIo<D, C> {
 
     /// A port of a socket or a USB serial port. An error, or the end of the stream, means that
     /// the link is lost.
+    ///
+    /// ```
+    /// use embedded_io::{Read, ReadReady, Write, WriteReady};
+    /// use mbm::client::BlockingClient;
+    /// use mbm::port::EmbeddedIo;
+    ///
+    /// fn read<S: Read + ReadReady + Write + WriteReady>(
+    ///     socket: S,
+    ///     micros: fn() -> u32,
+    /// ) -> Result<[u16; 2], mbm::Error> {
+    ///     let mut client = BlockingClient::tcp(EmbeddedIo::stream(socket, micros));
+    ///     client.holding_registers(17, 107)
+    /// }
+    /// ```
     pub const fn stream(socket: D, clock: C) -> Self {
         EmbeddedIo {
             device: socket,

@@ -23,6 +23,52 @@ pub use self::std_io::StdIo;
 use crate::error::Error;
 
 /// A byte stream and a clock. No function may block.
+///
+/// ```
+/// use mbm::port::Port;
+/// use mbm::Error;
+///
+/// /// A UART of a chip. The functions with an underscore in place of code are those of its registers.
+/// struct Uart;
+///
+/// impl Port for Uart {
+///     fn is_ready(&self) -> bool {
+///         true // It was set up.
+///     }
+///
+///     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+///         Ok(0) // The number of received bytes that were copied to `bytes`.
+///     }
+///
+///     fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+///         Ok(bytes.len()) // The number of these bytes that will be sent.
+///     }
+///
+///     fn micros(&mut self) -> u32 {
+///         0 // A timer of the chip.
+///     }
+///
+///     fn idle(&mut self, micros: u32) {
+///         // Sleeps until an interrupt.
+///     }
+///
+///     fn flush(&mut self) -> bool {
+///         true // The flag "transmission complete".
+///     }
+///
+///     fn knows_when_sent(&self) -> bool {
+///         true // It has such a flag.
+///     }
+///
+///     fn pre_transmission(&mut self) {
+///         // Switches the RS-485 driver on.
+///     }
+///
+///     fn post_transmission(&mut self) {
+///         // Switches it off.
+///     }
+/// }
+/// ```
 pub trait Port {
     /// True if a master and a client's line read one byte at a time: that takes less code, 56
     /// bytes on a Cortex-M0+ and 140 on an AVR. If false, they read all bytes that have arrived

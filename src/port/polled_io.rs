@@ -58,6 +58,17 @@ impl<D, C> PolledIo<D, C> {
 
     /// A port of a socket or a USB serial port. An error, or the end of the stream, means that
     /// the link is lost.
+    ///
+    /// ```
+    /// use embedded_io_async::{Read, Write};
+    /// use mbm::client::BlockingClient;
+    /// use mbm::port::PolledIo;
+    ///
+    /// fn read(socket: impl Read + Write, micros: fn() -> u32) -> Result<[u16; 2], mbm::Error> {
+    ///     let mut client = BlockingClient::tcp(PolledIo::stream(socket, micros));
+    ///     client.holding_registers(17, 107)
+    /// }
+    /// ```
     pub const fn stream(socket: D, clock: C) -> Self {
         PolledIo::new(socket, clock, false)
     }
@@ -78,6 +89,23 @@ impl<D, C> PolledIo<D, C> {
     /// As this port, with an RS-485 driver: `driver` switches it on with `true` before the
     /// first byte is sent, and off after the last one. That has left once the device is flushed, and
     /// once its time has passed at this baud rate; the driver stays on for one character more.
+    ///
+    /// ```
+    /// use embedded_io_async::{Read, Write};
+    /// use mbm::client::BlockingClient;
+    /// use mbm::port::PolledIo;
+    ///
+    /// fn read<U: Read + Write>(
+    ///     uart: U,
+    ///     micros: fn() -> u32,
+    ///     switch_driver: fn(bool),
+    /// ) -> Result<[u16; 2], mbm::Error> {
+    ///     let port = PolledIo::serial(uart, micros).with_driver(switch_driver, 19200);
+    ///     let mut client = BlockingClient::rtu(port);
+    ///     client.settings().set_baud_rate(19200);
+    ///     client.holding_registers(17, 107)
+    /// }
+    /// ```
     pub fn with_driver<E: FnMut(bool)>(self, driver: E, baud: u32) -> PolledIo<D, C, E> {
         PolledIo {
             device: self.device,

@@ -65,6 +65,17 @@ impl StdIo<TcpStream> {
 
 impl<T> StdIo<T> {
     /// A connection that reads and writes without waiting. Its end is a lost link.
+    ///
+    /// ```no_run
+    /// use mbm::port::StdIo;
+    /// use std::os::unix::net::UnixStream;
+    ///
+    /// let socket = UnixStream::connect("/run/modbus.sock")?;
+    /// socket.set_nonblocking(true)?;
+    /// let mut port = StdIo::stream(socket);
+    /// let address = port.get_mut().peer_addr()?;
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn stream(io: T) -> Self {
         let begun = Instant::now();
         StdIo {
@@ -97,6 +108,14 @@ impl<T> StdIo<T> {
     }
 
     /// The socket or serial port.
+    ///
+    /// ```no_run
+    /// use mbm::port::StdIo;
+    ///
+    /// let mut port = StdIo::connect("192.168.1.10:502")?;
+    /// let server = port.get_mut().peer_addr()?;
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn get_mut(&mut self) -> &mut T {
         &mut self.io
     }

@@ -8,6 +8,18 @@ use core::cell::Cell;
 /// Serves a request of a user-defined function. The request PDU is the first `length` bytes of
 /// `pdu`. `handler` gets the data after the function code, and the free bytes after the
 /// request, into which it writes the data of the response.
+///
+/// ```
+/// use mbm::server::custom::{serve, HandlerResult};
+/// use mbm::server::Reply;
+///
+/// let mut pdu = [65, 1, 2, 0, 0, 0];
+/// let reply = serve(&mut pdu, 3, |data, space| {
+///     space[0] = data[0] + data[1];
+///     HandlerResult::Data(1)
+/// });
+/// assert_eq!((reply, &pdu[..2]), (Reply::length(2), &[65, 3][..]));
+/// ```
 pub fn serve(
     pdu: &mut [u8],
     length: usize,
@@ -33,6 +45,19 @@ pub fn serve(
 }
 
 /// The result of the handler of a user-defined function.
+///
+/// ```
+/// use mbm::server::custom::HandlerResult;
+/// use mbm::Exception;
+///
+/// fn check(data: &[u8]) -> HandlerResult {
+///     match data {
+///         [0..=100] => HandlerResult::Data(0),
+///         _ => HandlerResult::Exception(Exception::IllegalDataValue.code()),
+///     }
+/// }
+/// assert_eq!(check(&[200]), HandlerResult::Exception(3));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum HandlerResult {
     /// A response with this number of data bytes.
@@ -48,6 +73,26 @@ pub enum HandlerResult {
 }
 
 /// Serves one function code with a closure: see [`serve`].
+///
+/// ```
+/// use mbm::server::custom::{Custom, HandlerResult};
+/// use mbm::server::ServiceUnit;
+///
+/// // Function 65 sends back what it gets.
+/// let mut echo = Custom {
+///     function: 65,
+///     handler: |_: u8, data: &[u8], space: &mut [u8]| {
+///         space[..data.len()].copy_from_slice(data);
+///         HandlerResult::Data(data.len())
+///     },
+/// };
+/// let mut units = [ServiceUnit { id: 17, services: &mut [&mut echo], diagnostics: None }];
+/// # let mut frame = [17, 65, 7, 0, 0, 0, 0, 0];
+/// # let length = mbm::frame::rtu::emit(&mut frame, 17, |pdu| { pdu[..2].copy_from_slice(&[65, 7]); Ok(2) })?;
+/// # let framing = mbm::frame::Framing::Rtu;
+/// # assert_eq!(mbm::server::respond(framing, b'\n', &mut frame, length, &mut units[..]), Ok(5));
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Custom<F> {
     /// The function code; 0 stands for every code that no earlier service serves.
@@ -75,6 +120,15 @@ impl<F: FnMut(u8, &[u8], &mut [u8]) -> HandlerResult> Service for Custom<F> {
 
 /// Responds with exception 01 to disabled functions. It comes before the services that would
 /// serve them. One bit for each function code; 1 disables the function.
+///
+/// ```
+/// use mbm::server::custom::DisabledFunctions;
+///
+/// // Function 6 is not served.
+/// let mut disabled = DisabledFunctions([0; 16]);
+/// disabled.0[0] |= 1 << 6;
+/// assert!(disabled.is_disabled(6) && !disabled.is_disabled(3));
+/// ```
 #[derive(Debug)]
 pub struct DisabledFunctions(pub [u8; 16]);
 

@@ -61,6 +61,23 @@ pub trait Device {
     ///
     /// # Errors
     /// This and the other functions return the exception with which the request is refused.
+    ///
+    /// ```
+    /// use mbm::server::{BitsMut, Device};
+    /// use mbm::Exception;
+    ///
+    /// struct Relay(bool);
+    ///
+    /// impl Device for Relay {
+    ///     fn read_coils(&mut self, address: u16, coils: &mut BitsMut) -> Result<(), Exception> {
+    ///         match (address, coils.len()) {
+    ///             (0, 1) => coils.set(0, self.0),
+    ///             _ => return Err(Exception::IllegalDataAddress),
+    ///         }
+    ///         Ok(())
+    ///     }
+    /// }
+    /// ```
     fn read_coils(&mut self, address: u16, coils: &mut BitsMut) -> Result<(), Exception> {
         Err(Exception::IllegalFunction)
     }
@@ -69,6 +86,23 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// use mbm::server::{BitsMut, Device};
+    /// use mbm::Exception;
+    ///
+    /// struct Doors([bool; 4]);
+    ///
+    /// impl Device for Doors {
+    ///     fn read_discrete_inputs(&mut self, address: u16, inputs: &mut BitsMut) -> Result<(), Exception> {
+    ///         let doors = self.0.get(usize::from(address)..).unwrap_or_default();
+    ///         let doors = doors.get(..inputs.len()).ok_or(Exception::IllegalDataAddress)?;
+    ///         inputs.set_all(doors.iter().copied());
+    ///         Ok(())
+    ///     }
+    /// }
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     fn read_discrete_inputs(
         &mut self,
         address: u16,
@@ -93,6 +127,23 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// use mbm::server::Device;
+    /// use mbm::Exception;
+    ///
+    /// struct Thermometer(u16);
+    ///
+    /// impl Device for Thermometer {
+    ///     fn read_input_registers(&mut self, address: u16, registers: &mut [u16]) -> Result<(), Exception> {
+    ///         match (address, registers) {
+    ///             (0, [temperature]) => *temperature = self.0,
+    ///             _ => return Err(Exception::IllegalDataAddress),
+    ///         }
+    ///         Ok(())
+    ///     }
+    /// }
+    /// ```
     fn read_input_registers(
         &mut self,
         address: u16,
@@ -105,6 +156,23 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// use mbm::server::{Bits, Device};
+    /// use mbm::Exception;
+    ///
+    /// struct Relay(bool);
+    ///
+    /// impl Device for Relay {
+    ///     fn write_coils(&mut self, address: u16, coils: &Bits) -> Result<(), Exception> {
+    ///         match (address, coils.len(), coils.get(0)) {
+    ///             (0, 1, Some(on)) => self.0 = on,
+    ///             _ => return Err(Exception::IllegalDataAddress),
+    ///         }
+    ///         Ok(())
+    ///     }
+    /// }
+    /// ```
     fn write_coils(&mut self, address: u16, coils: &Bits) -> Result<(), Exception> {
         Err(Exception::IllegalFunction)
     }
@@ -126,6 +194,23 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// use mbm::server::Device;
+    /// use mbm::Exception;
+    ///
+    /// struct Meter;
+    ///
+    /// impl Device for Meter {
+    ///     // A read of this device takes long, so it is not made to see whether it is possible.
+    ///     fn check_holding_registers(&mut self, address: u16, quantity: u16) -> Result<(), Exception> {
+    ///         match u32::from(address) + u32::from(quantity) {
+    ///             0..=200 => Ok(()),
+    ///             _ => Err(Exception::IllegalDataAddress),
+    ///         }
+    ///     }
+    /// }
+    /// ```
     fn check_holding_registers(&mut self, address: u16, quantity: u16) -> Result<(), Exception> {
         let mut words = [0; crate::pdu::MAX_READ_REGISTERS as usize];
         match words.get_mut(..quantity.into()) {
@@ -138,6 +223,17 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump { is_hot: bool }
+    /// # impl Device for Pump {
+    /// fn read_exception_status(&mut self) -> Result<u8, Exception> {
+    ///     Ok(u8::from(self.is_hot))
+    /// }
+    /// # }
+    /// ```
     fn read_exception_status(&mut self) -> Result<u8, Exception> {
         Err(Exception::IllegalFunction)
     }
@@ -147,6 +243,21 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump;
+    /// # impl Device for Pump {
+    /// fn report_server_id(&mut self, data: &mut [u8]) -> Result<usize, Exception> {
+    ///     let id = b"pump\xFF"; // FF: it runs.
+    ///     let place = data.get_mut(..id.len()).ok_or(Exception::ServerDeviceFailure)?;
+    ///     place.copy_from_slice(id);
+    ///     Ok(id.len())
+    /// }
+    /// # }
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     fn report_server_id(&mut self, data: &mut [u8]) -> Result<usize, Exception> {
         Err(Exception::IllegalFunction)
     }
@@ -155,6 +266,26 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump { log: [u16; 100] }
+    /// # impl Device for Pump {
+    /// fn read_file_record(
+    ///     &mut self,
+    ///     file: u16,
+    ///     record: u16,
+    ///     records: &mut [u16],
+    /// ) -> Result<(), Exception> {
+    ///     let log = self.log.get(usize::from(record)..).filter(|_| file == 1);
+    ///     let wanted = log.and_then(|log| log.get(..records.len()));
+    ///     records.copy_from_slice(wanted.ok_or(Exception::IllegalDataAddress)?);
+    ///     Ok(())
+    /// }
+    /// # }
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     fn read_file_record(
         &mut self,
         file: u16,
@@ -169,6 +300,21 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump { log: [u16; 100] }
+    /// # impl Device for Pump {
+    /// fn write_file_record(&mut self, file: u16, record: u16, records: &[u16]) -> Result<(), Exception> {
+    ///     let log = self.log.get_mut(usize::from(record)..).filter(|_| file == 1);
+    ///     let place = log.and_then(|log| log.get_mut(..records.len()));
+    ///     place.ok_or(Exception::IllegalDataAddress)?.copy_from_slice(records);
+    ///     Ok(())
+    /// }
+    /// # }
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
     fn write_file_record(
         &mut self,
         file: u16,
@@ -183,6 +329,23 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump { alarms: Vec<u16> }
+    /// # impl Device for Pump {
+    /// fn read_fifo_queue(&mut self, address: u16, queue: &mut [u16; 31]) -> Result<usize, Exception> {
+    ///     if address != 1000 {
+    ///         return Err(Exception::IllegalDataAddress);
+    ///     }
+    ///     for (place, alarm) in queue.iter_mut().zip(&self.alarms) {
+    ///         *place = *alarm;
+    ///     }
+    ///     Ok(self.alarms.len())
+    /// }
+    /// # }
+    /// ```
     fn read_fifo_queue(&mut self, address: u16, queue: &mut [u16; 31]) -> Result<usize, Exception> {
         Err(Exception::IllegalFunction)
     }
@@ -190,6 +353,16 @@ pub trait Device {
     /// 2B/0E: returns the object of a device identification with this id; `None` if there is no such
     /// one. Objects 0 to 2 are vendor, product and revision. A device without object 0 does not serve
     /// the function.
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # struct Pump;
+    /// # impl Device for Pump {
+    /// fn identification(&self, object: u8) -> Option<&[u8]> {
+    ///     [&b"vendor"[..], b"pump", b"1.0"].get(usize::from(object)).copied()
+    /// }
+    /// # }
+    /// ```
     fn identification(&self, object: u8) -> Option<&[u8]> {
         None
     }
@@ -199,6 +372,27 @@ pub trait Device {
     ///
     /// # Errors
     /// As [`Device::read_coils`].
+    ///
+    /// ```
+    /// # use mbm::server::Device;
+    /// # use mbm::Exception;
+    /// # struct Pump;
+    /// # impl Device for Pump {
+    /// fn custom(
+    ///     &mut self,
+    ///     function: u8,
+    ///     data: &[u8],
+    ///     response: &mut [u8],
+    /// ) -> Result<usize, Exception> {
+    ///     match (function, data, response) {
+    ///         (65, [speed @ 0..=100], [place, ..]) => *place = *speed,
+    ///         (65, ..) => return Err(Exception::IllegalDataValue),
+    ///         _ => return Err(Exception::IllegalFunction),
+    ///     }
+    ///     Ok(1)
+    /// }
+    /// # }
+    /// ```
     fn custom(
         &mut self,
         function: u8,
@@ -223,6 +417,25 @@ pub trait Device {
 ///     Ok(())
 /// }
 /// # }
+/// ```
+///
+/// ```
+/// use mbm::server::{BitsMut, Device};
+/// use mbm::Exception;
+///
+/// struct Door {
+///     is_open: bool,
+/// }
+///
+/// impl Device for Door {
+///     fn read_discrete_inputs(&mut self, address: u16, inputs: &mut BitsMut) -> Result<(), Exception> {
+///         if address != 0 || inputs.is_empty() || inputs.len() > 1 {
+///             return Err(Exception::IllegalDataAddress);
+///         }
+///         inputs.set(0, self.is_open);
+///         Ok(())
+///     }
+/// }
 /// ```
 #[derive(Debug)]
 pub struct BitsMut<'a> {
@@ -264,6 +477,29 @@ impl<'a> BitsMut<'a> {
 }
 
 /// The coils that a request writes.
+///
+/// ```
+/// use mbm::server::{Bits, Device};
+/// use mbm::Exception;
+///
+/// struct Relays {
+///     on: [bool; 8],
+/// }
+///
+/// impl Device for Relays {
+///     fn write_coils(&mut self, address: u16, coils: &Bits) -> Result<(), Exception> {
+///         let first = usize::from(address);
+///         let places = self.on.get_mut(first..first + coils.len());
+///         for (place, on) in places.ok_or(Exception::IllegalDataAddress)?.iter_mut().zip(coils.iter()) {
+///             *place = on;
+///         }
+///         // The first one, which every request has.
+///         assert!(!coils.is_empty() && coils.get(0).is_some());
+///         Ok(())
+///     }
+/// }
+/// # Ok::<(), mbm::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Bits<'a> {
     bytes: &'a [u8],

@@ -7,6 +7,15 @@ use crate::pdu::functions::{DIAGNOSTICS, GET_COMM_EVENT_COUNTER, GET_COMM_EVENT_
 use crate::pdu::MAX_EVENTS;
 
 /// The diagnostics of a unit's line. All fields are zero at first. Counters wrap at 65536.
+///
+/// ```
+/// use mbm::server::diagnostics::Diagnostics;
+/// use mbm::server::{Tables, Unit};
+///
+/// // With counters, the unit serves functions 08, 0B and 0C.
+/// let mut unit = Unit::new(17, Tables::NONE);
+/// unit.diagnostics = Some(Diagnostics::NEW);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
 pub struct Diagnostics {

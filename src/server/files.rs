@@ -7,6 +7,48 @@ use crate::pdu::functions::{READ_FIFO_QUEUE, READ_FILE_RECORD, WRITE_FILE_RECORD
 use crate::pdu::{MAX_FIFO, READ_FILE_BYTES};
 
 /// The records of files. Each record is one register.
+///
+/// ```
+/// use mbm::pdu::files::Record;
+/// use mbm::server::files::Files;
+///
+/// /// File 1, of ten records.
+/// struct Log {
+///     records: [[u8; 2]; 10],
+/// }
+///
+/// impl Files for Log {
+///     fn contains(&self, record: Record) -> bool {
+///         record.file == 1 && record.record + record.length <= 10
+///     }
+///
+///     fn load(&self, record: Record, data: &mut [u8]) {
+///         let from = &self.records[usize::from(record.record)..];
+///         for (to, from) in data.chunks_mut(2).zip(from) {
+///             to.copy_from_slice(from);
+///         }
+///     }
+///
+///     fn store(&mut self, record: Record, data: &[u8]) {
+///         let to = &mut self.records[usize::from(record.record)..];
+///         for (to, from) in to.iter_mut().zip(data.chunks(2)) {
+///             to.copy_from_slice(from);
+///         }
+///     }
+///
+///     fn before_read(&mut self, _: Record) -> u8 {
+///         0 // Anybody may read.
+///     }
+///
+///     fn before_write(&mut self, record: Record, _: &[u8]) -> u8 {
+///         if record.record == 0 { 2 } else { 0 } // Record 0 is read only: exception 02.
+///     }
+///
+///     fn after_write(&mut self, _: Record, _: &[u8]) {
+///         // Saves the file.
+///     }
+/// }
+/// ```
 pub trait Files {
     /// True if all of these records exist.
     fn contains(&self, record: Record) -> bool;
@@ -38,6 +80,25 @@ pub trait Files {
 }
 
 /// FIFO queues of registers.
+///
+/// ```
+/// use mbm::server::files::Fifos;
+///
+/// /// One queue, at address 1000.
+/// struct Alarms(Vec<u16>);
+///
+/// impl Fifos for Alarms {
+///     fn count(&self, address: u16) -> Option<u16> {
+///         (address == 1000).then_some(self.0.len() as u16)
+///     }
+///
+///     fn load(&self, _: u16, data: &mut [u8]) {
+///         for (to, from) in data.chunks_mut(2).zip(&self.0) {
+///             to.copy_from_slice(&from.to_be_bytes());
+///         }
+///     }
+/// }
+/// ```
 pub trait Fifos {
     /// How many registers the queue at this address holds; `None` if there is no queue.
     fn count(&self, address: u16) -> Option<u16>;
@@ -52,6 +113,21 @@ fn refusal(status: Status) -> Reply {
 
 /// Serves functions 14 and 15. The request PDU is the first `length` bytes of `pdu`; the
 /// response overwrites it.
+///
+/// ```
+/// use mbm::pdu::files::Record;
+/// use mbm::server::files::{serve, Files};
+/// use mbm::server::{Reply, Service};
+///
+/// /// A service of files.
+/// struct FileService<F>(F);
+///
+/// impl<F: Files> Service for FileService<F> {
+///     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+///         serve(&mut self.0, pdu, length)
+///     }
+/// }
+/// ```
 pub fn serve(files: &mut impl Files, pdu: &mut [u8], length: usize) -> Reply {
     let (function, count) = match pdu.get(..length) {
         Some([function @ (READ_FILE_RECORD | WRITE_FILE_RECORD), count, ..]) => (*function, *count),
@@ -134,6 +210,20 @@ fn write(files: &mut impl Files, request: &[u8], length: usize) -> Reply {
 }
 
 /// Serves function 18, with arguments as of [`serve`].
+///
+/// ```
+/// use mbm::server::files::{serve_fifos, Fifos};
+/// use mbm::server::{Reply, Service};
+///
+/// /// A service of queues.
+/// struct FifoService<F>(F);
+///
+/// impl<F: Fifos> Service for FifoService<F> {
+///     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+///         serve_fifos(&self.0, pdu, length)
+///     }
+/// }
+/// ```
 pub fn serve_fifos(fifos: &impl Fifos, pdu: &mut [u8], length: usize) -> Reply {
     if pdu.first() != Some(&READ_FIFO_QUEUE) {
         return Reply::NOT_HANDLED;

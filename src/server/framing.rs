@@ -647,6 +647,18 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 /// [`Status::PENDING`] if a service is not finished. The request frame is then unchanged, except
 /// for ASCII: its decoding has overwritten the frame. So put an ASCII frame into the buffer again
 /// before the next call.
+///
+/// ```
+/// use mbm::frame::{ascii::END, Framing};
+/// use mbm::server::{respond, Tables, Unit};
+///
+/// let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100]));
+/// let mut frame = [0; 260];
+/// frame[..12].copy_from_slice(&[0, 5, 0, 0, 0, 6, 17, 3, 0, 107, 0, 2]);
+/// let length = respond(Framing::Tcp, END, &mut frame, 12, &mut unit)?;
+/// assert_eq!(frame[..length], [0, 5, 0, 0, 0, 7, 17, 3, 4, 0x02, 0x2B, 0, 100]);
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub fn respond(
     framing: Framing,
     delimiter: u8,

@@ -11,6 +11,15 @@ use crate::pdu::MAX_PDU;
 
 /// Serves function 07 with eight outputs. The request PDU is the first `length` bytes of
 /// `pdu`; the response overwrites it.
+///
+/// ```
+/// use mbm::server::identity::serve_exception_status;
+/// use mbm::server::Reply;
+///
+/// let mut pdu = [7, 0];
+/// assert_eq!(serve_exception_status(0b101, &mut pdu, 1), Reply::length(2));
+/// assert_eq!(pdu, [7, 0b101]);
+/// ```
 pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Reply {
     match pdu {
         [READ_EXCEPTION_STATUS, ..] if length != 1 => Reply::ILLEGAL_DATA_VALUE,
@@ -24,6 +33,15 @@ pub fn serve_exception_status(outputs: u8, pdu: &mut [u8], length: usize) -> Rep
 
 /// Serves function 11, with `pdu` and `length` as for [`serve_exception_status`]. The response
 /// has the server's id, the run indicator and the additional data.
+///
+/// ```
+/// use mbm::server::identity::serve_server_id;
+/// use mbm::server::Reply;
+///
+/// let mut pdu = [0x11, 0, 0, 0, 0];
+/// assert_eq!(serve_server_id(&[17], true, b"m", &mut pdu, 1), Reply::length(5));
+/// assert_eq!(pdu, [0x11, 3, 17, 0xFF, b'm']);
+/// ```
 pub fn serve_server_id(
     id: &[u8],
     running: bool,
@@ -52,6 +70,18 @@ pub fn serve_server_id(
 }
 
 /// The objects of a device identification (clause 6.21).
+///
+/// ```
+/// use mbm::server::identity::Objects;
+///
+/// struct Pump;
+///
+/// impl Objects for Pump {
+///     fn object(&self, id: u8) -> Option<&[u8]> {
+///         [&b"mbm"[..], b"pump", b"1.0"].get(usize::from(id)).copied()
+///     }
+/// }
+/// ```
 pub trait Objects {
     /// The value of the object with this id; `None` if there is no such object.
     fn object(&self, id: u8) -> Option<&[u8]>;
@@ -64,6 +94,20 @@ const LAST: [u8; 3] = [0x02, 0x7F, 0xFF];
 const OBJECTS: usize = 7;
 
 /// Serves function 2B/0E, with `pdu` and `length` as for [`serve_exception_status`].
+///
+/// ```
+/// use mbm::server::identity::{serve_identification, Objects};
+/// use mbm::server::{Reply, Service};
+///
+/// /// A service of objects.
+/// struct Identification<O>(O);
+///
+/// impl<O: Objects> Service for Identification<O> {
+///     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+///         serve_identification(&self.0, pdu, length)
+///     }
+/// }
+/// ```
 pub fn serve_identification(objects: &impl Objects, pdu: &mut [u8], length: usize) -> Reply {
     let (code, id) = match pdu.get(..length) {
         Some([ENCAPSULATED_INTERFACE_TRANSPORT, MEI_READ_DEVICE_IDENTIFICATION, rest @ ..]) => {

@@ -7,6 +7,29 @@ use crate::pdu::functions::{self, Direction};
 use crate::pdu::EXCEPTION;
 
 /// The address and the position of a received frame.
+///
+/// ```
+/// use mbm::server::{Indication, Reply, Tables, Unit, Units};
+///
+/// /// Counts the frames that address the unit.
+/// struct Counted<U> {
+///     unit: U,
+///     frames: u32,
+/// }
+///
+/// impl<U: Units> Units for Counted<U> {
+///     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
+///         self.frames += u32::from(info.to == 17);
+///         self.unit.serve(info, pdu)
+///     }
+///
+///     fn has(&self, unit: u8) -> bool {
+///         self.unit.has(unit)
+///     }
+/// }
+/// let counted = Counted { unit: Unit::new(17, Tables::NONE), frames: 0 };
+/// assert!(counted.has(17) && !counted.has(18));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(C)]
 pub struct Indication {

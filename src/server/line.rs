@@ -31,6 +31,15 @@ pub(super) const UNKNOWN_CHARACTER: u16 = 1_152;
 
 /// The storage of a server: the frame buffer of [`Storage`], which holds a request, then its
 /// response, and more that is optional.
+///
+/// ```
+/// use mbm::server::ServerStorage;
+///
+/// // Arrays of bytes are storage.
+/// let storage = [0; 256];
+/// assert!(storage.serves(17));
+/// assert_eq!(storage.rule(65), None);
+/// ```
 pub trait ServerStorage: Storage<Count = usize> {
     /// True if the server serves this unit. On an RTU line it waits for the rest of a request to
     /// such a unit. [`Server::serve`] also asks [`Units::has`].
@@ -102,6 +111,26 @@ impl LatencyOrReadAhead {
 }
 
 /// A server on one line or connection.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// use mbm::server::{Server, Tables, Unit};
+///
+/// let mut server = Server::rtu(rtu());
+/// server.set_baud_rate(19200);
+/// server.set_receive_latency(20);
+/// server.set_silence(2000);
+/// server.set_echo_discard(true);
+/// let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
+///
+/// // In the main loop, with the time of the clock:
+/// # let now = 0;
+/// server.serve(now, &mut unit)?;
+/// let sleep = server.poll_delay(now);
+/// # Ok(())
+/// # }
+/// ```
 // The small fields come first: see `Engine`.
 #[repr(C)]
 #[derive(Clone, Debug)]
@@ -175,6 +204,18 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// A server that has begun with this framing. 256 bytes of storage hold any RTU frame, 513 any
     /// ASCII frame, 260 any frame on TCP.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::frame::Framing;
+    /// use mbm::server::Server;
+    ///
+    /// let server = Server::with_framing(Framing::Tcp, tcp(), [0; 260]);
+    /// assert!(!server.is_sending());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn with_framing(framing: Framing, port: P, storage: B) -> Self {
         let mut server = Server::new(port, storage);
         match framing {
@@ -209,6 +250,16 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// True while the server sends a response, with the driver of the line enabled.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::server::Server;
+    ///
+    /// assert!(!Server::tcp(tcp()).is_sending());
+    /// # Ok(())
+    /// # }
+    /// ```
     #[inline(always)]
     pub fn is_sending(&self) -> bool {
         self.phase == ServerPhase::Send
@@ -270,6 +321,23 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     /// Returns [`Status::PENDING`] if a request waits for its reply; [`Status::LINK_LOST`];
     /// [`Status::MALFORMED_FRAME`] if the stream is not Modbus TCP;
     /// [`Status::NOT_INITIALISED`] without a framing; otherwise [`Status::OK`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::server::{Reply, Server};
+    /// use mbm::Status;
+    ///
+    /// // A program that serves requests by itself, here with exception 01.
+    /// let mut server = Server::tcp(tcp());
+    /// # let now = 0;
+    /// if server.poll(now) == Status::PENDING {
+    ///     let function = server.pdu()[0];
+    ///     server.answer(Reply::ILLEGAL_FUNCTION);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn poll(&mut self, now: u32) -> Status {
         match self.look(now) {
             Status::OK => self.go_on(),
@@ -448,6 +516,22 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     }
 
     /// The PDU of the request, with the space after it that the response may fill.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::server::{Reply, Server};
+    ///
+    /// fn answer(server: &mut Server<impl mbm::port::Port, [u8; 260]>) {
+    ///     // Function 65 returns one byte.
+    ///     if let [65, place, ..] = server.pdu() {
+    ///         *place = 7;
+    ///         server.answer(Reply::length(2));
+    ///     }
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn pdu(&mut self) -> &mut [u8] {
         let head = usize::from(self.request.head);
         let space = usize::from(self.request.space);
@@ -461,6 +545,20 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
     ///
     /// # Errors
     /// As [`Server::poll`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// use mbm::server::{Server, Tables, Unit};
+    ///
+    /// let mut server = Server::tcp(tcp());
+    /// let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
+    /// // In the main loop, with the time of the clock:
+    /// # let now = 0;
+    /// server.serve(now, &mut unit)?;
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn serve(&mut self, now: u32, units: &mut (impl Units + ?Sized)) -> Result<(), Error> {
         match self.look_for(now, &|unit| units.has(unit)) {
             Status::PENDING => {
@@ -507,6 +605,14 @@ impl<P: Port, B: ServerStorage> Server<P, B> {
 
     /// Takes the reply to the request. The PDU of a response has overwritten that of the request.
     /// For [`Reply::PENDING`] the server keeps the request and returns false.
+    ///
+    /// ```
+    /// use mbm::server::{Reply, Server};
+    ///
+    /// fn refuse(server: &mut Server<impl mbm::port::Port, [u8; 260]>) {
+    ///     server.answer(Reply::SERVER_DEVICE_FAILURE);
+    /// }
+    /// ```
     pub fn answer(&mut self, reply: Reply) -> bool {
         self.answer_served(reply.or_illegal())
     }

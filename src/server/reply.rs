@@ -4,6 +4,15 @@
 use crate::pdu::EXCEPTION;
 
 /// The result of a service that was called with a request.
+///
+/// ```
+/// use mbm::server::Reply;
+///
+/// let refusal = Reply::exception(2);
+/// assert_eq!(refusal, Reply::ILLEGAL_DATA_ADDRESS);
+/// assert_eq!(refusal.exception_code(), 2);
+/// assert_eq!(Reply::length(5).exception_code(), 0);
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Reply(usize);

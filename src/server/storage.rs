@@ -6,18 +6,46 @@ use core::fmt;
 use core::ops::Range;
 
 /// Input registers: serves 04.
+///
+/// ```
+/// use mbm::server::storage::{InputRegisters, RegisterArray};
+///
+/// let mut words = [21, 22];
+/// let service = InputRegisters(RegisterArray::new(0, &mut words));
+/// ```
 #[derive(Debug)]
 pub struct InputRegisters<T>(pub T);
 
 /// Holding registers: serves 03, 06, 10, 16 and 17.
+///
+/// ```
+/// use mbm::server::storage::{HoldingRegisters, RegisterArray};
+///
+/// let mut words = [555, 100];
+/// let service = HoldingRegisters(RegisterArray::new(107, &mut words));
+/// ```
 #[derive(Debug)]
 pub struct HoldingRegisters<T>(pub T);
 
 /// Discrete inputs: serves 02.
+///
+/// ```
+/// use mbm::server::storage::{BitArray, DiscreteInputs};
+///
+/// let mut bits = [0b101];
+/// let service = DiscreteInputs(BitArray::new(0, &mut bits));
+/// ```
 #[derive(Debug)]
 pub struct DiscreteInputs<T>(pub T);
 
 /// Coils: serves 01, 05 and 0F.
+///
+/// ```
+/// use mbm::server::storage::{BitArray, Coils};
+///
+/// let mut bits = [0b101];
+/// let service = Coils(BitArray::new(0, &mut bits));
+/// ```
 #[derive(Debug)]
 pub struct Coils<T>(pub T);
 
@@ -56,6 +84,16 @@ pub type BeforeWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]) -> u8;
 pub type AfterWrite<'a> = &'a mut dyn FnMut(u16, u16, &[u8]);
 
 /// Registers in an array.
+///
+/// ```
+/// use mbm::server::storage::RegisterArray;
+///
+/// // Nobody may write register 107.
+/// let mut words = [555, 100];
+/// let mut refuse = |address: u16, _: u16, _: &[u8]| if address == 107 { 2 } else { 0 };
+/// let mut registers = RegisterArray::new(107, &mut words);
+/// registers.before_write = Some(&mut refuse);
+/// ```
 pub struct RegisterArray<'a> {
     /// The registers.
     pub words: &'a mut [u16],
@@ -73,6 +111,16 @@ pub struct RegisterArray<'a> {
 }
 
 /// Bits in an array, eight to a byte, lowest first.
+///
+/// ```
+/// use mbm::server::storage::BitArray;
+///
+/// // Twelve coils, of which the fourth does not exist.
+/// let (mut bits, valid) = ([0, 0], [0b1111_0111, 0x0F]);
+/// let mut coils = BitArray::new(0, &mut bits);
+/// coils.size = 12;
+/// coils.valid = Some(&valid);
+/// ```
 pub struct BitArray<'a> {
     /// The bits.
     pub bits: &'a mut [u8],

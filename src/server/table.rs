@@ -59,6 +59,15 @@ impl TableKind {
 }
 
 /// The direction of a transfer.
+///
+/// ```
+/// use mbm::server::table::Direction;
+///
+/// fn is_allowed(direction: Direction, is_locked: bool) -> bool {
+///     direction == Direction::Read || !is_locked
+/// }
+/// assert!(is_allowed(Direction::Read, true));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Direction {
     /// From the cells into the data.
@@ -68,6 +77,42 @@ pub enum Direction {
 }
 
 /// The cells of a table: registers or bits.
+///
+/// ```
+/// use mbm::server::storage::HoldingRegisters;
+/// use mbm::server::table::{DataModel, Direction};
+///
+/// /// Register 107 is the speed of a pump.
+/// struct Pump {
+///     speed: [u8; 2],
+///     starts: u32,
+/// }
+///
+/// impl DataModel for Pump {
+///     fn contains(&self, address: u16, quantity: u16) -> bool {
+///         address == 107 && quantity == 1
+///     }
+///
+///     fn transfer(&mut self, direction: Direction, _: u16, _: u16, data: &mut [u8]) {
+///         match direction {
+///             Direction::Read => data.copy_from_slice(&self.speed),
+///             Direction::Write => self.speed.copy_from_slice(data),
+///         }
+///     }
+///
+///     fn before(&mut self, direction: Direction, _: u16, _: u16, data: &[u8]) -> u8 {
+///         match (direction, data) {
+///             (Direction::Write, [4..=255, _]) => 3, // Too fast: exception 03.
+///             _ => 0,
+///         }
+///     }
+///
+///     fn after_write(&mut self, _: u16, _: u16, data: &[u8]) {
+///         self.starts += u32::from(data != [0, 0]);
+///     }
+/// }
+/// let service = HoldingRegisters(Pump { speed: [0, 0], starts: 0 });
+/// ```
 pub trait DataModel {
     /// True if all of the `quantity` cells from `address` on exist. None may lie beyond
     /// address 65535.

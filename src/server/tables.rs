@@ -5,6 +5,13 @@ use crate::bytes::copy;
 use crate::error::Exception;
 
 /// Values at consecutive addresses: an array, a slice or another container of them.
+///
+/// ```
+/// use mbm::server::Table;
+///
+/// let registers = Table::new(107, [555, 100, 0, 0]);
+/// assert_eq!((registers.base, registers.cells[0]), (107, 555));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Table<C> {
     /// Address of the first value.
@@ -62,6 +69,13 @@ impl Tables {
 
 impl<C, D, H, I> Tables<C, D, H, I> {
     /// Has these coils, from address `base` on.
+    ///
+    /// ```
+    /// use mbm::server::Tables;
+    ///
+    /// let pump = Tables::NONE.with_coils(0, [true, false]);
+    /// assert_eq!(pump.coils.cells, [true, false]);
+    /// ```
     pub fn with_coils<T: AsMut<[bool]>>(self, base: u16, coils: T) -> Tables<T, D, H, I> {
         Tables {
             coils: Table::new(base, coils),
@@ -72,6 +86,13 @@ impl<C, D, H, I> Tables<C, D, H, I> {
     }
 
     /// Has these discrete inputs, from address `base` on.
+    ///
+    /// ```
+    /// use mbm::server::Tables;
+    ///
+    /// let pump = Tables::NONE.with_discrete_inputs(0, [true, false]);
+    /// assert_eq!(pump.discrete_inputs.cells, [true, false]);
+    /// ```
     pub fn with_discrete_inputs<T: AsMut<[bool]>>(
         self,
         base: u16,
@@ -100,6 +121,13 @@ impl<C, D, H, I> Tables<C, D, H, I> {
     }
 
     /// Has these input registers, from address `base` on.
+    ///
+    /// ```
+    /// use mbm::server::Tables;
+    ///
+    /// let meter = Tables::NONE.with_input_registers(0, [21, 22]);
+    /// assert_eq!(meter.input_registers.cells, [21, 22]);
+    /// ```
     pub fn with_input_registers<T: AsMut<[u16]>>(
         self,
         base: u16,

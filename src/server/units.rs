@@ -6,6 +6,29 @@ use super::{Addressing, Indication, Refusal, Reply};
 use core::fmt;
 
 /// A service: one family of functions.
+///
+/// ```
+/// use mbm::server::{Reply, Service};
+///
+/// /// Function 65 returns the temperature.
+/// struct Temperature(u8);
+///
+/// impl Service for Temperature {
+///     fn serve(&mut self, pdu: &mut [u8], length: usize) -> Reply {
+///         match (pdu, length) {
+///             ([65, place, ..], 1) => {
+///                 *place = self.0;
+///                 Reply::length(2)
+///             }
+///             _ => Reply::NOT_HANDLED,
+///         }
+///     }
+///
+///     fn is_custom(&self) -> bool {
+///         true
+///     }
+/// }
+/// ```
 pub trait Service {
     /// Serves a request whose function belongs to this family. The PDU of the request is the
     /// first `length` bytes of `pdu`; the PDU of the response overwrites it. Returns
@@ -20,6 +43,26 @@ pub trait Service {
 }
 
 /// The units that serve the frames of a line.
+///
+/// ```
+/// use mbm::server::{Indication, Reply, Tables, Unit, Units};
+///
+/// /// Two units with different devices.
+/// struct Both<A, B>(A, B);
+///
+/// impl<A: Units, B: Units> Units for Both<A, B> {
+///     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply {
+///         match self.0.has(info.to) {
+///             true => self.0.serve(info, pdu),
+///             false => self.1.serve(info, pdu),
+///         }
+///     }
+///
+///     fn has(&self, unit: u8) -> bool {
+///         self.0.has(unit) || self.1.has(unit)
+///     }
+/// }
+/// ```
 pub trait Units {
     /// Serves a frame, whichever unit it is addressed to. Its PDU is at the front of `pdu`.
     fn serve(&mut self, info: &Indication, pdu: &mut [u8]) -> Reply;
@@ -34,6 +77,21 @@ pub trait Units {
 
 /// One unit of a list of services. [`Unit`](super::Unit) is one of a
 /// [`Device`](super::Device), which most programs have.
+///
+/// ```
+/// use mbm::server::storage::{HoldingRegisters, RegisterArray};
+/// use mbm::server::{Server, ServiceUnit};
+/// # fn serve(mut server: Server<impl mbm::port::Port, [u8; 256]>, now: u32) -> Result<(), mbm::Error> {
+///
+/// let mut words = [555, 100, 0, 0];
+/// // Functions 03, 06, 10, 16 and 17 of registers 107 to 110, and no other.
+/// let mut registers = HoldingRegisters(RegisterArray::new(107, &mut words));
+/// let mut units = [ServiceUnit { id: 17, services: &mut [&mut registers], diagnostics: None }];
+/// server.serve(now, &mut units[..])?;
+/// # Ok(())
+/// # }
+/// # Ok::<(), mbm::Error>(())
+/// ```
 pub struct ServiceUnit<'a> {
     /// The unit id, 1 to 247; 0 in a stream responds to every id.
     pub id: u8,
