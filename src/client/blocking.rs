@@ -51,6 +51,26 @@ use crate::port::Port;
 /// # }
 /// ```
 ///
+/// ```compile_fail
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// let coils: [bool; 2001] = client.coils(17, 0)?; // 2000 is the most.
+/// # Ok(())
+/// # }
+/// ```
+///
+/// Nor does a number that is no code of a device identification:
+///
+/// ```compile_fail
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+/// client.read_device_identification(17, 7, 0, &mut [0; 250])?;
+/// # Ok(())
+/// # }
+/// ```
+///
 /// Between two polls the client calls [`Port::idle`], in which a port may sleep. A program that must
 /// not wait queues a [`Request`](super::Request) in a [`Client`]; the client here has such a one
 /// inside, with a queue for one request.

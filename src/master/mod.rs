@@ -61,6 +61,29 @@ use request::Line;
 /// # Ok(())
 /// # }
 /// ```
+///
+/// A quantity that is known when the program is compiled, and that the standard does not allow, does
+/// not compile:
+///
+/// ```compile_fail
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+/// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+/// let words: [u16; 126] = master.holding_registers(0)?; // 125 is the most.
+/// # Ok(())
+/// # }
+/// ```
+///
+/// ```compile_fail
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
+/// # fn main() -> Result<(), mbm::Error> {
+/// # let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);
+/// # let mut master = mbm::master::Master::new(17, rtu(), buffers);
+/// let coils: [bool; 0] = master.coils(0)?; // 1 is the least.
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Hash, Debug)]
 pub struct Master<P, S: Words> {
     node: Node,
