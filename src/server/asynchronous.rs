@@ -74,6 +74,23 @@ pub trait AsyncUnits {
     fn answer(&mut self, info: &Indication, pdu: &mut [u8]) -> impl Future<Output = Reply>;
 
     /// As [`Units::has`].
+    ///
+    /// ```
+    /// use mbm::server::{AsyncUnits, Indication, Reply};
+    ///
+    /// /// Unit 17 of a device that is read by a future.
+    /// struct Sensor;
+    ///
+    /// impl AsyncUnits for Sensor {
+    ///     async fn answer(&mut self, _: &Indication, _: &mut [u8]) -> Reply {
+    ///         Reply::SERVER_DEVICE_FAILURE
+    ///     }
+    ///
+    ///     fn contains(&self, unit: u8) -> bool {
+    ///         unit == 17
+    ///     }
+    /// }
+    /// ```
     fn contains(&self, unit: u8) -> bool {
         let _ = unit;
         true
@@ -118,6 +135,21 @@ impl<U: Units + ?Sized> AsyncUnits for U {
 ///   it is given up, because the line may belong to others by then. The RS-485 driver goes off when the
 ///   future is dropped. So a program that drops often awaits [`AsyncServer::serve`] to its end, or
 ///   gives the server a task.
+///
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+/// # use mbm::{port::AsyncIo, server::AsyncServer};
+/// # fn main() {
+/// // For a line on which an adapter holds bytes back, and a driver that must stay on for longer:
+/// let mut server = AsyncServer::rtu(AsyncIo::serial(uart(), micros, Delay));
+/// server.set_baud_rate(9600);
+/// server.set_silence(5000);
+/// server.set_receive_latency(20);
+/// server.set_echo_discard(true);
+/// server.set_post_flush_hold(2);
+/// assert_eq!(server.storage().len(), 256);
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct AsyncServer<P, B> {
     server: Server<P, B>,
@@ -139,6 +171,20 @@ impl<P: Port> AsyncServer<P, [u8; 256]> {
 
     /// A server of RTU frames in a TCP stream, with a buffer for any. See the example at
     /// [`AsyncUnits`].
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+    /// # use mbm::{port::AsyncIo, server::{AsyncServer, Tables, Unit}};
+    /// # async fn run() {
+    /// # let socket = wire(&[17, 6, 0x00, 0x6D, 0x03, 0x78, 0x1A, 0x55]);
+    /// # let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(109, [0]));
+    /// let mut server = AsyncServer::rtu_over_tcp(AsyncIo::stream(socket, micros, Delay));
+    /// let lost = server.run(&mut unit).await;
+    /// # assert_eq!(lost, mbm::Error::LinkLost);
+    /// # assert_eq!(unit.device.holding_registers.cells, [888]);
+    /// # }
+    /// # fn main() { block_on(run()) }
+    /// ```
     pub const fn rtu_over_tcp(port: P) -> Self {
         AsyncServer::new(Server::rtu_over_tcp(port))
     }

@@ -54,8 +54,15 @@ pub struct Indication {
 }
 
 /// How a frame addresses a unit.
-// For the C API; it may change in any version.
-#[doc(hidden)]
+///
+/// ```
+/// use mbm::server::{Addressing, Indication};
+///
+/// /// Whether unit 17 responds to a frame with this function code.
+/// fn responds(info: &Indication, function: u8) -> bool {
+///     info.to == 17 && info.addressing(function) == Addressing::OWN
+/// }
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(transparent)]
 pub struct Addressing(MachineByte);
@@ -103,8 +110,15 @@ impl Indication {
     };
 
     /// How the frame, with this function code, addresses the unit that its id names.
-    // For the C API; it may change in any version.
-    #[doc(hidden)]
+    ///
+    /// ```
+    /// use mbm::server::{Addressing, Indication};
+    ///
+    /// // A broadcast may write, but not read.
+    /// let broadcast = Indication { to: 0, own: 0, length: 5, ..Indication::NONE };
+    /// assert_eq!(broadcast.addressing(6), Addressing::BROADCAST);
+    /// assert_eq!(broadcast.addressing(3), Addressing::FOREIGN);
+    /// ```
     #[inline]
     pub const fn addressing(&self, function: u8) -> Addressing {
         match self.addressing_of_all(function) {

@@ -37,10 +37,10 @@ mod units;
 pub use asynchronous::{AsyncServer, AsyncUnits};
 pub use device::{Bits, BitsMut, Device};
 pub use framing::{respond, DELIMITER};
-pub use indication::Indication;
+pub use indication::{Addressing, Indication};
 // For the C API; it may change in any version.
 #[doc(hidden)]
-pub use indication::{only_writes, Addressing, ANY};
+pub use indication::{only_writes, ANY};
 pub use line::{Server, ServerStorage};
 // For the C API; it may change in any version.
 #[doc(hidden)]
