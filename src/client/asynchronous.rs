@@ -1,10 +1,11 @@
 //! A client whose functions are futures, over the traits of embedded-io-async.
 
+use super::accessors::{accessor, accessors};
 use super::call::{
     take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
     CALL_BYTES,
 };
-use super::calls::{accessor, accessors, calls, example};
+use super::calls::{calls, example};
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
 use super::transaction::Serial;

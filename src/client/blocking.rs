@@ -1,10 +1,11 @@
 //! A client whose calls wait for their end.
 
+use super::accessors::{accessor, accessors};
 use super::call::{
     take_records, Call, CommEventCounter, CommEventLog, Groups, ReadRecords, WriteRecords,
     CALL_BYTES,
 };
-use super::calls::{accessor, accessors, calls, example};
+use super::calls::{calls, example};
 use super::storage::TcpBuffers;
 use super::tcp::Tcp;
 use super::transaction::Serial;
@@ -207,19 +208,14 @@ impl<L: Transport<Call<D>>, const D: usize> BlockingClient<L, D> {
     ///
     /// ```
     /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/pump.rs"));
-    /// # fn read(client: &mut mbm::client::BlockingClient<TcpLine>) -> Result<[u16; 2], mbm::Error> {
-    /// match client.holding_registers(17, 107) {
-    ///     Err(mbm::Error::LinkLost) => {
-    ///         *client.port() = tcp();
-    ///         client.reconnect();
-    ///         client.holding_registers(17, 107)
-    ///     }
-    ///     result => result,
+    /// # fn main() -> Result<(), mbm::Error> {
+    /// # let mut client = mbm::client::BlockingClient::tcp(tcp());
+    /// # let connect = tcp;
+    /// if client.holding_registers::<2>(17, 107) == Err(mbm::Error::LinkLost) {
+    ///     *client.port() = connect();
+    ///     client.reconnect();
     /// }
-    /// # }
-    /// # fn main() {
-    /// #     let mut client = mbm::client::BlockingClient::tcp(tcp());
-    /// #     assert_eq!(read(&mut client), Ok([555, 100]));
+    /// # Ok(())
     /// # }
     /// ```
     pub fn reconnect(&mut self) {

@@ -5,6 +5,7 @@
 //! in another way, as the C API does, implements [`ClientRequest`]. The client copies data only
 //! between a request and a frame buffer.
 
+mod accessors;
 #[cfg(feature = "embedded-io-async")]
 mod asynchronous;
 mod blocking;
