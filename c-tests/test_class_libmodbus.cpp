@@ -1,9 +1,14 @@
 /* ModbusMaster with a real libmodbus server on a pty. */
+#include "libmodbus_client.h"
 #include "pty_stream.h"
 #include "wire.h"
 
+#include "ModbusClient.h"
+#include "ModbusServer.h"
+
 extern "C" {
 #include "await.h"
+#include "pty.h"
 #include "server.h"
 }
 
@@ -92,4 +97,49 @@ TEST(copies_take_turns_on_one_line)
         assert_int_equal(nodes[i % 3].readHoldingRegisters(static_cast<uint16_t>(i), 1), 0);
         assert_int_equal(nodes[i % 3].getResponseBuffer(0), server_pattern(i));
     }
+}
+
+/* --- over USB, where a pty is like: bytes come in blocks, and silence means nothing */
+
+TEST(a_client_over_usb_reads_what_the_server_holds)
+{
+    ModbusSerialClient client;
+    ModbusRequestOf<125> request(17);
+    assert_int_equal(client.beginUsb(line), MBM_OK);
+    client.setResponseTimeout(PATIENCE_MS);
+    assert_int_equal(client.readHoldingRegisters(request, 3, 125), MBM_PENDING);
+    AWAIT(client.poll() != MBM_PENDING);
+    assert_int_equal(request.status(), MBM_OK);
+    for (unsigned i = 0; i < 125; i++)
+        assert_int_equal(request[static_cast<uint8_t>(i)], server_pattern(3 + i));
+}
+
+static int read_and_write(modbus_t *client)
+{
+    uint16_t words[123] = {0};
+    for (uint16_t i = 0; i < 100; i++)
+        words[i] = static_cast<uint16_t>(i * 3);
+    if (modbus_write_registers(client, 10, 100, words) != 100 ||
+        modbus_read_registers(client, 0, 120, words) != 120)
+        return -1;
+    return words[0] == 0 && words[11] == 3 && words[109] == 297 && words[110] == 0;
+}
+
+TEST(a_server_over_usb_answers_a_libmodbus_client)
+{
+    ModbusRegisterArray<120> registers;
+    ModbusServer ours;
+    PtyStream usb;
+    pty port;
+    pty_open(&port);
+    usb.fd = port.ours;
+    ours.holdingRegisters(registers);
+    assert_int_equal(ours.beginUsb(17, usb), MBM_OK);
+    modbus_t *client = modbus_new_rtu(port.path, 115200, 'N', 8, 1);
+    modbus_set_slave(client, 17);
+    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
+    assert_int_equal(modbus_connect(client), 0);
+    assert_int_equal(result_of(client, read_and_write, [&ours] { ours.poll(); }), 1);
+    close_client(client);
+    pty_close(&port);
 }
