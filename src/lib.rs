@@ -76,6 +76,25 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 //!
+//! As a future, with the feature `embedded-io-async`. On a serial line it is
+//! `AsyncServer::rtu(AsyncIo::serial(uart, micros, Delay))`:
+//!
+#![cfg_attr(feature = "embedded-io-async", doc = "```")]
+#![cfg_attr(not(feature = "embedded-io-async"), doc = "```ignore")]
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+//! use mbm::port::AsyncIo;
+//! use mbm::server::{AsyncServer, Tables, Unit};
+//!
+//! # fn accept() -> Wire { wire(&[0, 1, 0, 0, 0, 6, 17, 6, 0x00, 0x6D, 0x03, 0x78]) }
+//! async fn serve() -> mbm::Error {
+//!     let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(107, [555, 100, 0, 0]));
+//!     let mut server = AsyncServer::tcp(AsyncIo::stream(accept(), micros, Delay));
+//!     // Until the connection ends.
+//!     server.run(&mut unit).await
+//! }
+//! # fn main() { assert_eq!(block_on(serve()), mbm::Error::LinkLost); }
+//! ```
+//!
 //! # Which type
 //!
 //! | you want | type |
@@ -86,6 +105,7 @@
 //! | one RTU line in little memory, in calls that wait or with `poll` | [`master::Master`] |
 //! | that with futures | `master::AsyncMaster` |
 //! | a server of your values | [`server::Server`] with a [`server::Device`] of yours, or with [`server::Tables`] |
+//! | that with futures | `server::AsyncServer`; `server::AsyncUnits` for values that are awaited |
 //! | values read at intervals | [`plan`] |
 //! | a gateway from TCP to lines | [`gateway`] |
 //! | the traffic of others | [`sniffer`], [`trace`] |
@@ -220,7 +240,7 @@
 //! | feature | what it adds |
 //! |---|---|
 //! | `embedded-io` | `port::EmbeddedIo`, a port over embedded-io |
-//! | `embedded-io-async` | `client::AsyncClient` and `master::AsyncMaster`, a client and a master with futures, over embedded-io-async and embedded-hal-async; `port::PolledIo`, a port over embedded-io-async |
+//! | `embedded-io-async` | `client::AsyncClient`, `master::AsyncMaster` and `server::AsyncServer`, a client, a master and a server with futures, over embedded-io-async and embedded-hal-async; `port::PolledIo`, a port over embedded-io-async |
 //! | `std` | `port::StdIo`, a port over a socket or serial port of the standard library |
 //! | `defmt` | `defmt::Format` for [`Status`], [`Error`] and [`Exception`] |
 
