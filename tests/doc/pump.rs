@@ -99,3 +99,10 @@ fn rtu() -> SimulatedPort<Unit<Pump>> {
 fn tcp() -> SimulatedPort<Unit<Pump>> {
     SimulatedPort::tcp(unit())
 }
+
+/// The line of a client of that port.
+#[allow(dead_code)]
+type TcpLine = mbm::client::Tcp<
+    SimulatedPort<Unit<Pump>>,
+    mbm::client::TcpBuffers<[u8; 260], [u8; 260]>,
+>;
