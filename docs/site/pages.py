@@ -21,14 +21,6 @@ CASES = "capi/tests/field/cases/"
 CASES_MARK = "<!-- field cases -->"
 
 
-# How the search weighs pages: what people begin with comes first, reports and pages for maintainers last.
-WEIGHTS = [(r"docs/(guide-|questions|tool|porting-)|README", 3), (r"docs/reports/|docs/maintainers/|docs/field-cases|CHANGELOG|CONTRIBUTING", 0.3)]
-
-
-def weight(path):
-    return next((number for pattern, number in WEIGHTS if re.match(pattern, path)), 1)
-
-
 class Site:
     """What is where. `names` are those of the API: {name: (page, anchor)}."""
 
@@ -83,8 +75,7 @@ class Site:
             elif fence is None and not line.startswith("<div "):
                 line = self.line(line, path, page)
             lines.append(line)
-        head = f"---\nsearch:\n  boost: {weight(path)}\n---\n\n" if weight(path) != 1 else ""
-        return head + self.resolve("\n".join(lines) + "\n", page)
+        return self.resolve("\n".join(lines) + "\n", page)
 
     def field_cases(self):
         """The table of the field cases, one row for each."""
