@@ -15,23 +15,30 @@
 // A pin or two, and their levels while the transceiver sends, in the context of a callback: so an
 // object has no memory for them.
 struct ModbusDriverPin {
-#if defined(__AVR__)
-    typedef uint8_t Pin;
-#else
+    // STM32duino has pins above 255, for example 0xC0 and alternatives of it.
+#if defined(ARDUINO_ARCH_STM32)
     typedef uint16_t Pin;
+#else
+    typedef uint8_t Pin;
 #endif
-    enum : uint8_t { bits = 8 * sizeof(Pin) };
+    // Half of a context, which is a pointer: two bytes on AVR.
+#if defined(__AVR__)
+    typedef uint8_t Half;
+#else
+    typedef uint16_t Half;
+#endif
+    enum : uint8_t { bits = 8 * sizeof(Half) };
 
     static uintptr_t of(Pin pin, bool isHigh)
     {
-        return static_cast<uintptr_t>(static_cast<Pin>(pin << 1 | (isHigh ? 1 : 0)));
+        return static_cast<uintptr_t>(static_cast<Half>(pin << 1 | (isHigh ? 1 : 0)));
     }
     static void *contextOf(uintptr_t first, uintptr_t second = 0)
     {
         return reinterpret_cast<void *>(second << bits | first);
     }
 
-    static Pin number(uintptr_t pins) { return static_cast<Pin>(static_cast<Pin>(pins) >> 1); }
+    static Pin number(uintptr_t pins) { return static_cast<Pin>(static_cast<Half>(pins) >> 1); }
 
     // Sets a pin as for sending or as for receiving.
     static void set(uintptr_t pins, bool isSending)
