@@ -286,6 +286,23 @@ impl<P: Port, B: ServerStorage> AsyncServer<P, B> {
     /// flush ends while bytes are left in the hardware. With 0, as at first, that time is one character
     /// if the baud rate is set, and more after a flush that was too early for all bytes to have left. A
     /// UART that leaves several bytes behind a long response needs the number of them.
+    ///
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doc/executor.rs"));
+    /// # use mbm::{port::AsyncIo, server::AsyncServer};
+    /// # fn switch_driver(_: bool) {}
+    /// # fn main() {
+    /// let port = AsyncIo::serial_with_driver(uart(), micros, Delay, switch_driver);
+    /// let mut server = AsyncServer::rtu(port);
+    /// server.set_baud_rate(19200);
+    /// // A transmitter with 32 bytes, whose flush does not wait for them.
+    /// server.set_post_flush_hold(32);
+    /// // The receiver gets what the driver sends.
+    /// server.set_echo_discard(true);
+    /// // The UART hands bytes over at once.
+    /// server.set_receive_latency(0);
+    /// # }
+    /// ```
     pub const fn set_post_flush_hold(&mut self, characters: u8) {
         self.post_flush_characters = characters;
     }

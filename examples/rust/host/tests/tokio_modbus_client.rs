@@ -1,10 +1,16 @@
 //! Clients of tokio-modbus at the programs that serve on tokio.
 
+use embedded_io_adapters::tokio_1::FromTokio;
+use mbm::port::AsyncIo;
+use mbm::server::{AsyncServer, Tables, Unit};
+use mbm_host_example::{micros, Delay};
 use std::io::{BufRead, BufReader};
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::task::yield_now;
+
 use tokio_modbus::client::{rtu, tcp, Client, Context, Reader, Writer};
 use tokio_modbus::prelude::SlaveContext;
 use tokio_modbus::{ExceptionCode, Request, Response, Slave};
@@ -99,6 +105,43 @@ async fn a_client_of_another_unit_gets_no_answer() {
     let mut client = connect(&server).await;
     let read = client.read_holding_registers(107, 1).await;
     assert_eq!(read.unwrap(), Ok(vec![555]));
+}
+
+/// Lets other tasks run so many times.
+async fn yield_times(times: u32) {
+    for _ in 0..times {
+        yield_now().await;
+    }
+}
+
+#[tokio::test]
+async fn a_server_whose_future_is_dropped_again_and_again_answers_each_request() {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
+    let address = listener.local_addr().unwrap();
+    let serving = tokio::spawn(async move {
+        let socket = FromTokio::new(listener.accept().await.unwrap().0);
+        let mut server = AsyncServer::tcp(AsyncIo::stream(socket, micros, Delay));
+        let mut unit = Unit::new(17, Tables::NONE.with_holding_registers(0, [0; 123]));
+        let mut dropped = 0;
+        loop {
+            tokio::select! {
+                lost = server.run(&mut unit) => return (lost, dropped),
+                () = yield_times(dropped % 5) => dropped += 1,
+            }
+        }
+    });
+    let mut client = tcp::connect_slave(address, Slave(17)).await.unwrap();
+    for value in 0..300 {
+        let values = vec![value; 123];
+        let written = client.write_multiple_registers(0, &values).await;
+        assert_eq!(written.unwrap(), Ok(()));
+        let read = client.read_holding_registers(0, 123).await;
+        assert_eq!(read.unwrap(), Ok(values));
+    }
+    client.disconnect().await.expect("it ends");
+    let (lost, dropped) = serving.await.expect("the task");
+    assert_eq!(lost, mbm::Error::LinkLost);
+    assert!(dropped > 100, "{dropped}");
 }
 
 #[tokio::test]
