@@ -285,7 +285,8 @@ $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversio
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
 $(BUILD)/$(1)/test_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
-$(BUILD)/$(1)/test_stm32: INCLUDES += -Ic-tests/stm32 -Iports/stm32
+$(BUILD)/$(1)/test_porttest_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
+$(patsubst %,$(BUILD)/$(1)/%,test_stm32 test_porttest_stm32): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)

@@ -630,6 +630,19 @@ TEST(a_line_that_was_closed_is_a_lost_link_and_may_be_opened_again)
     reads(5, 2, 500);
 }
 
+TEST(a_line_that_was_zeroed_while_it_was_open_may_be_opened_again)
+{
+    static UART_HandleTypeDef console;
+
+    start(1);
+    open_line();
+    chip_abort_reception();
+    memset(&uart, 0, sizeof uart);
+    open_line();
+    mbm_stm32_noteReceived(&console);
+    reads(5, 2, 500);
+}
+
 /* The callbacks of the HAL are those of all UARTs. */
 TEST(callbacks_of_another_uart_change_nothing)
 {

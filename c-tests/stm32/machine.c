@@ -104,12 +104,10 @@ static void arrive(void)
     first++;
     heard = m.now;
     isIdle = 0;
-    if (m.isDriving) {
-        /* Both drive the wire. The receiver is off, or gets what nobody sent. */
+    /* Both drive the wire, and the receiver is off. */
+    if (m.isDriving && !m.isLooped) {
         m.collisions++;
-        if (!m.echoes)
-            return;
-        byte ^= 0x55;
+        return;
     }
     chip_receive(byte, errors);
 }
@@ -121,6 +119,11 @@ static void leave(void)
     m.undriven += !m.isDriving;
     m.sent[m.sentCount] = (uint8_t)shifting;
     m.sentAt[m.sentCount++] = m.now;
+    if (m.isLooped) {
+        heard = m.now;
+        isIdle = 0;
+        chip_receive((uint8_t)shifting, NONE);
+    }
     shifting = -1;
     load();
     if (shifting < 0 && wasSending) {

@@ -14,7 +14,8 @@ typedef struct machine {
     uint8_t isMasked;   /* interrupts wait */
 
     /* faults of the chip */
-    uint8_t hasNoPin, txDmaStops, rxDmaStops, echoes;
+    uint8_t hasNoPin, txDmaStops, rxDmaStops;
+    uint8_t isLooped; /* a wire leads from TX to RX */
 
     /* the wire: what was sent, and when its last bit had left */
     uint8_t sent[MACHINE_SENT];

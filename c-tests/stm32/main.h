@@ -89,6 +89,5 @@ void Error_Handler(void);
 
 /* Small buffers, so that tests are often at their ends. */
 #define MBM_STM32_RECEIVE_BYTES 64
-#define MBM_STM32_SEND_BYTES 128
 
 #endif

@@ -453,9 +453,10 @@ static void forget(mbm_stm32Line *line)
 {
     mbm_stm32Line **place = &lines;
 
-    while (*place != line)
+    while (*place != NULL && *place != line)
         place = &(*place)->next;
-    *place = line->next;
+    if (*place != NULL)
+        *place = line->next;
     line->uart = NULL;
 }
 
@@ -477,6 +478,8 @@ uint8_t mbm_stm32_open(mbm_stm32Line *line, UART_HandleTypeDef *uart, mbm_port *
     memset(&line->ring, 0, sizeof line->ring);
     if (!receives_by_dma(uart))
         mbm_ring_begin(&line->ring.ofInterrupt, line->received, sizeof line->received);
+    /* A line that was zeroed while it was open is in the list already. */
+    forget(line);
     line->uart = uart;
     line->next = lines;
     lines = line;

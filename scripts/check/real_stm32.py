@@ -158,7 +158,7 @@ def on_this_machine(kit) -> None:
     with_hal = [f"-D{CHIPS[name][0]}", "-DUSE_HAL_DRIVER", "-include", host / "shim.h", f"-I{work}", "-isystem", hal / "Inc", "-isystem",
                 kit.tree / f"cmsis_device_{name}/Include", "-isystem", kit.tree / "cmsis_core/Core/Include"]
     (work / "main.h").write_text(f'#include "stm32{name}xx_hal.h"\nextern UART_HandleTypeDef huart1;\n'
-                                 "#define MBM_STM32_RECEIVE_BYTES 64\n#define MBM_STM32_SEND_BYTES 128\n")
+                                 "#define MBM_STM32_RECEIVE_BYTES 64\n")
     sources = [*((hal / f"Src/stm32{name}xx_hal_{part}.c", ["-w", *with_hal]) for part in ("uart", "dma", "gpio")),
                (host / f"chip_{name}.c", ["-Wall", "-Wextra", "-Werror", *with_hal]), (host / "registers.c", ["-O1"]),
                (root / "c-tests/stm32/machine.c", ["-O1"]), (root / "c-tests/support/test.c", ["-O1"]),

@@ -1,0 +1,92 @@
+/* The port for STM32 in the test kit for ports, on a chip that is played. TX is wired to RX. */
+#include "mbm_porttest.h"
+#include "mbm_stm32.h"
+
+#include "machine.h"
+#include "test.h"
+
+static mbm_portTest test;
+static mbm_stm32Line uart;
+static mbm_port port, watched;
+
+/* The clock goes on while the program looks at it. */
+static uint32_t micros(void *context)
+{
+    machine_run(2);
+    return port.micros(context);
+}
+
+static void yield(void *context)
+{
+    machine_run(20);
+}
+
+static uint32_t reference(void *context)
+{
+    return (uint32_t)(m.now / 1000u);
+}
+
+static uint32_t lost(void *context)
+{
+    return mbm_stm32_lost(&uart) + uart.overruns;
+}
+
+static uint8_t driver(void *context)
+{
+    return chip_is_driving() != 0;
+}
+
+static void disturb(void *context)
+{
+    machine_receive_faulty(0, FRAMING);
+    machine_run(200);
+}
+
+static uint8_t begin_again(void *context)
+{
+    mbm_stm32_close(&uart);
+    return mbm_stm32_open(&uart, &huart1, &port) != MBM_STM32_OK;
+}
+
+static void say(void *context, mbm_portFinding kind, const char *sentence)
+{
+    print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
+}
+
+static void passes(uint8_t byDma)
+{
+    machine_start(byDma, byDma);
+    memset(&uart, 0, sizeof uart);
+    memset(&test, 0, sizeof test);
+    m.isLooped = 1;
+    uart.driverPort = GPIOA;
+    uart.driverPin = GPIO_PIN_8;
+    assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
+    watched = port;
+    watched.micros = micros;
+    test.port = &watched;
+    test.isLooped = 1;
+    test.bits = 11;
+    test.baud = 115200;
+    test.holds = MBM_STM32_RECEIVE_BYTES - 1;
+    test.say = say;
+    test.lost = lost;
+    test.driver = driver;
+    test.begin = begin_again;
+    test.disturb = disturb;
+    test.reference = reference;
+    test.yield = yield;
+    assert_int_equal(mbm_portTest_run(&test), 0);
+    assert_int_equal(test.advice, 0);
+    mbm_stm32_close(&uart);
+}
+
+TEST(the_port_for_stm32_by_dma)
+{
+    passes(1);
+}
+
+TEST(the_port_for_stm32_by_interrupt)
+{
+    passes(0);
+}
