@@ -12,7 +12,7 @@ RUST_SANITIZERS := --cfg mbm_reads_single_bytes -Zsanitizer=address -Cdebug-asse
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wundef -Werror
 # The hooks of a test seldom use all that they get.
 TEST_WARNINGS := $(WARNINGS) -Wno-unused-parameter
-INCLUDES := -Iinclude -Iports/linux -Iports/test -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
+INCLUDES := -Iinclude -Iports/linux -Iports/test -Iports/freertos -Iexamples/linux -Ic-tests/support -Ic-tests/shim -Icli
 CFLAGS := -std=c11 -O1 -g
 CXXFLAGS := -std=c++11 -O1 -g
 MODBUS = $(shell pkg-config --cflags libmodbus)
@@ -288,6 +288,7 @@ $(BUILD)/$(1)/test_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_mode
 $(BUILD)/$(1)/test_porttest_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
 $(patsubst %,$(BUILD)/$(1)/%,test_stm32 test_porttest_stm32): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
+$(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_freertos*.c)): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c))
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
