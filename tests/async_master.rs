@@ -63,7 +63,11 @@ impl Write for Uart {
     }
 
     async fn flush(&mut self) -> Result<(), ErrorKind> {
-        until(|| self.0.borrow().is_flushed().then_some(Ok(()))).await
+        until(|| {
+            let wire = self.0.borrow();
+            (wire.is_flushed() || wire.flushes_early).then_some(Ok(()))
+        })
+        .await
     }
 }
 
@@ -582,4 +586,15 @@ fn a_write_of_no_byte_and_a_flush_that_fails_are_a_lost_link() {
         let write = master.write_single_register(100, 1);
         assert_eq!(bench.run(write), Err(Error::LinkLost), "{writes}");
     }
+}
+
+#[test]
+fn the_driver_is_on_until_the_last_byte_has_left_even_if_a_flush_ends_early() {
+    let mut bench = Bench::new();
+    bench.wire.borrow_mut().flushes_early = true;
+    let mut master = master(&bench);
+    let write = master.write_multiple_registers(100, &[7; 10]);
+    assert_eq!(bench.run(write), Ok(()));
+    let wire = bench.wire.borrow();
+    assert!(!wire.is_cut_off && !wire.driver);
 }

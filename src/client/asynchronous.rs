@@ -270,6 +270,7 @@ async fn send<L, U, C, T, E, const D: usize>(client: &mut Client<L, Call<D>, 1>)
 where
     L: Transport<Call<D>, Port = AsyncIo<U, C, T, E>>,
     U: Read + Write,
+    C: FnMut() -> u32,
     T: DelayNs,
 {
     let Some(length) = client.port().frame_length() else {
@@ -278,8 +279,9 @@ where
     let settings = client.settings();
     let characters = u32::from(settings.any_character()) * u32::from(length);
     let limit = characters.saturating_add(settings.response_timeout.get());
+    let character = settings.character;
     let (port, frame) = client.line.accepted(length);
-    port.send(frame, limit).await;
+    port.send_and_hold(frame, limit, character).await;
     true
 }
 
@@ -288,6 +290,7 @@ async fn go_on<L, U, C, T, E, const D: usize>(client: &mut Client<L, Call<D>, 1>
 where
     L: Transport<Call<D>, Port = AsyncIo<U, C, T, E>>,
     U: Read + Write,
+    C: FnMut() -> u32,
     T: DelayNs,
 {
     if send(client).await {

@@ -182,7 +182,8 @@ where
     let characters = u32::from(settings.any_character()) << 8;
     let limit = characters.saturating_add(settings.response_timeout.get());
     let frame = line.storage.slice(0, length as u8);
-    line.port.send(frame, limit).await;
+    let character = settings.character;
+    line.port.send_and_hold(frame, limit, character).await;
     true
 }
 

@@ -2,6 +2,7 @@
 
 use super::Port;
 use crate::error::Error;
+use crate::time::{elapsed, Micros, Micros16};
 use core::future::{poll_fn, ready, Future};
 use core::pin::{pin, Pin};
 use core::task::Poll;
@@ -248,6 +249,24 @@ impl<D, C, T, E> AsyncIo<D, C, T, E> {
     }
 }
 
+impl<D: Read + Write, C: FnMut() -> u32, T: DelayNs, E> AsyncIo<D, C, T, E> {
+    /// As [`AsyncIo::send`]. On a serial line with a known time of a character it also waits until the
+    /// bytes can have left: some UARTs end a flush while bytes are left in the hardware.
+    pub(crate) async fn send_and_hold(&mut self, frame: &[u8], limit: u32, character: Micros16) {
+        let begun = (self.clock)();
+        self.send(frame, limit).await;
+        let has_sent = self.outgoing == Outgoing::None && !self.is_lost;
+        if self.is_serial && has_sent && character > 0 {
+            let passed = elapsed((self.clock)(), begun);
+            let left = hold(character, frame.len() as u16, passed);
+            // The core keeps the driver on after a flush that was right, if that is set.
+            if left > character.into() {
+                self.timer.delay_us(left).await;
+            }
+        }
+    }
+}
+
 impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
     /// Takes what arrived before a request, so that the core does not search it for the reply.
     pub(crate) async fn take_old_bytes(&mut self) {
@@ -336,6 +355,18 @@ impl<D: Read + Write, C, T: DelayNs, E> AsyncIo<D, C, T, E> {
         let delay = if delay == 0 { PAUSE } else { delay };
         self.timer.delay_us(delay).await;
     }
+}
+
+/// The time for which a driver stays on after a flush that has ended `passed` microseconds after the
+/// first of so many characters: for one more, and for all if the flush was too early. Characters of 10
+/// bits cannot have left before; `character` has 11.
+pub(crate) const fn hold(character: Micros16, count: u16, passed: Micros) -> Micros {
+    let character = character as Micros;
+    let time = character * count as Micros;
+    if passed >= time / 11 * 10 {
+        return character;
+    }
+    (time + character).saturating_sub(passed)
 }
 
 /// The result of `future`; `None` if `timer` has ended before.

@@ -12,6 +12,8 @@ mod std_io;
 mod transmission;
 
 #[cfg(feature = "embedded-io-async")]
+pub(crate) use self::async_io::hold;
+#[cfg(feature = "embedded-io-async")]
 pub use self::async_io::AsyncIo;
 #[cfg(feature = "embedded-io")]
 pub use self::embedded_io::EmbeddedIo;

@@ -4,8 +4,8 @@ use super::line::{Server, ServerPhase, ServerStorage, UNKNOWN_CHARACTER};
 use super::{Addressing, Indication, Reply, Units};
 use crate::error::{Error, Status};
 use crate::frame::{rtu, Framing};
-use crate::port::{AsyncIo, Port};
-use crate::time::{elapsed, millis, Micros, Micros16, LONGEST};
+use crate::port::{hold, AsyncIo, Port};
+use crate::time::{elapsed, millis, Micros, LONGEST};
 use core::future::{ready, Future};
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
@@ -14,18 +14,6 @@ use embedded_io_async::{Read, Write};
 /// a socket, whose client may have stopped reading.
 const UART_TIMEOUT: Micros = millis(2_000);
 const SOCKET_TIMEOUT: Micros = millis(10_000);
-
-/// The time for which a driver stays on after a flush that has ended `passed` microseconds after the
-/// first of so many characters: for one more, and for all if the flush was too early. Characters of 10
-/// bits cannot have left before; `character` has 11.
-const fn hold(character: Micros16, count: u16, passed: Micros) -> Micros {
-    let character = character as Micros;
-    let time = character * count as Micros;
-    if passed >= time / 11 * 10 {
-        return character;
-    }
-    (time + character).saturating_sub(passed)
-}
 
 /// The units of an [`AsyncServer`]. All [`Units`] are such units. Implement this trait if they await
 /// something: a mutex of your executor, a sensor, another line.

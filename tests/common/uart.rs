@@ -23,6 +23,8 @@ pub struct Wire {
     pub read_fails: bool,
     /// Every write fails.
     pub write_fails: bool,
+    /// A flush ends although bytes have not left.
+    pub flushes_early: bool,
     /// No more bytes can be read.
     pub is_closed: bool,
     /// The device receives nothing.
