@@ -28,7 +28,7 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # The test kit for ports, and its own tests.
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
-PORT_TESTS := $(filter test_porttest%,$(TESTS))
+PORT_TESTS := $(filter test_porttest% test_freertos%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.

@@ -4,6 +4,7 @@
 #define _GNU_SOURCE
 #include "freertos.h"
 #include "mbm_freertos_uart.h"
+#include "mbm_porttest.h"
 #include "await.h"
 #include "mbm_tty.h"
 #include "must.h"
@@ -492,6 +493,73 @@ TEST_WITH(a_server_whose_uart_stops_answers_again_once_it_works, serve_setup, se
     modbus_set_response_timeout(client, LONG / 1000, 0);
     serves_right(2);
     assert_int_equal(mbm_freertos_stalled(&uart), 1);
+}
+
+/* --- the test kit for ports */
+
+static void hear(void *context, mbm_portFinding kind, const char *sentence)
+{
+    if (kind == MBM_PORT_WRONG)
+        print_error("%s\n", sentence);
+}
+
+static uint32_t lost(void *context)
+{
+    return mbm_freertos_lost(&uart);
+}
+
+static uint8_t driver(void *context)
+{
+    return (uint8_t)chip.driver;
+}
+
+static uint8_t begin(void *context)
+{
+    mbm_freertos_close(&uart);
+    return mbm_freertos_open(&uart, &port);
+}
+
+static void yield(void *context)
+{
+    poll(NULL, 0, 1);
+}
+
+static void kit_setup(void)
+{
+    static uint8_t whole_frame[MBM_MAX_FRAME + 1];
+
+    pty_open(&served);
+    settings();
+    uart.received = whole_frame;
+    uart.receivedBytes = sizeof whole_frame;
+    OK(mbm_freertos_open(&uart, &port));
+    chip_start(served.ours);
+}
+
+static void kit_teardown(void)
+{
+    chip_stop();
+    pty_close(&served);
+}
+
+TEST_WITH(the_port_passes_the_test_kit, kit_setup, kit_teardown)
+{
+    static mbm_portTest test;
+    static mbm_tty far;
+    mbm_port other;
+
+    OK(mbm_tty_attach(&far, served.theirs));
+    other = mbm_tty_port(&far);
+    test = (mbm_portTest){.port = &port,
+                          .other = &other,
+                          .holds = MBM_MAX_FRAME,
+                          .say = hear,
+                          .lost = lost,
+                          .driver = driver,
+                          .begin = begin,
+                          .yield = yield};
+    assert_int_equal(mbm_portTest_run(&test), 0);
+    assert_in_range(test.checks, 10, 100);
 }
 
 /* --- a port of another kind */
