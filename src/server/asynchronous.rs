@@ -410,7 +410,7 @@ where
                     let function = server.pdu().first().copied().unwrap_or(0);
                     let mut reply = units.answer(&info, server.pdu()).await;
                     let is_for_units = info.addressing(function) == Addressing::OWN;
-                    if reply != Reply::PENDING && (!is_for_units || is_late(server).await) {
+                    if reply != Reply::PENDING && (!is_for_units || receive_newer(server).await) {
                         reply = Reply::NO_RESPONSE;
                     }
                     if server.answer(reply) {
@@ -441,7 +441,7 @@ where
                 true
             } else if length > 0 && sent == 0 {
                 self.begun = port.micros();
-                !is_late(server).await
+                !receive_newer(server).await
             } else {
                 elapsed(port.micros(), self.stopped) < server.silence
             };
@@ -517,9 +517,9 @@ where
     }
 }
 
-/// True if the client on a serial line has sent another frame: it has given up the response to the last
-/// one. Fewer bytes may be noise.
-async fn is_late<D, C, T, E, B>(server: &mut Server<AsyncIo<D, C, T, E>, B>) -> bool
+/// Receives what has arrived. True if the client on a serial line has sent another frame: it has given up
+/// the response to the last one. Fewer bytes may be noise.
+async fn receive_newer<D, C, T, E, B>(server: &mut Server<AsyncIo<D, C, T, E>, B>) -> bool
 where
     D: Read + Write,
     T: DelayNs,
