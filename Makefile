@@ -470,6 +470,7 @@ include scripts/check/check.mk
 # Everything for Arduino and the AVR simulator.
 include firmware-tests/avr/avr.mk
 include firmware-tests/qemu/qemu.mk
+include firmware-tests/rp2040/rp2040.mk
 # The packages in dist/, and releases.
 include packaging/packaging.mk
 
@@ -477,4 +478,5 @@ include packaging/packaging.mk
 test-firmware: ## Run firmware on simulated chips against a libmodbus server
 	@$(MAKE) --no-print-directory test-firmware-avr
 	@$(MAKE) --no-print-directory test-firmware-qemu
-	@echo "test-firmware: sketches on AVR boards and bare metal on QEMU work"
+	@$(MAKE) --no-print-directory test-firmware-rp2040
+	@echo "test-firmware: sketches on AVR boards, bare metal on QEMU and a Pico over USB work"

@@ -1,5 +1,6 @@
-/* Plays the boot ROM of the RP2040 for the emulator: the lookup of functions, and those that programs call without being asked,
- * by the tables of the RP2040's datasheet (2.8.3). The chip's own ROM is not in this repository. */
+/* Plays the boot ROM of the RP2040 for the emulator: the lookup of functions, and those that
+ * programs call without being asked, by the tables of the RP2040's datasheet (2.8.3). The chip's
+ * own ROM is not in this repository. */
 #include <stdint.h>
 
 typedef uintptr_t word;
@@ -55,11 +56,13 @@ static uint32_t reverse(uint32_t value)
 }
 
 enum { MS, S4, MC, C4, L3, T3, P3, R3, COUNT };
-static const uint16_t codes[COUNT] = {'M' | 'S' << 8, 'S' | '4' << 8, 'M' | 'C' << 8, 'C' | '4' << 8,
-                                      'L' | '3' << 8, 'T' | '3' << 8, 'P' | '3' << 8, 'R' | '3' << 8};
-static const word functions[COUNT] = {
-    (word)set_bytes,           (word)set_bytes,            (word)copy_bytes, (word)copy_bytes,
-    (word)count_leading_zeros, (word)count_trailing_zeros, (word)count_ones, (word)reverse};
+static const uint16_t codes[COUNT] = {'M' | 'S' << 8, 'S' | '4' << 8, 'M' | 'C' << 8,
+                                      'C' | '4' << 8, 'L' | '3' << 8, 'T' | '3' << 8,
+                                      'P' | '3' << 8, 'R' | '3' << 8};
+static const word functions[COUNT] = {(word)set_bytes,           (word)set_bytes,
+                                      (word)copy_bytes,          (word)copy_bytes,
+                                      (word)count_leading_zeros, (word)count_trailing_zeros,
+                                      (word)count_ones,          (word)reverse};
 
 /* The table has no content here: the lookup is a function of the ROM too. */
 /* The first 32 bytes: stack, entry, and halfwords at 0x14 with the tables and the lookup. */

@@ -28,7 +28,7 @@ const chip = simulator.rp2040;
 // Lower levels are printed on standard output, which is the line.
 chip.logger = new ConsoleLogger(LogLevel.Error);
 const say = (text) => process.stderr.write(`${text}\n`);
-const out = (bytes) => { for (let at = 0; at < bytes.length;) at += writeSync(1, bytes, at); };
+const out = (bytes) => { for (let at = 0; at < bytes.length;) at += writeSync(1, Uint8Array.from(bytes), at); };
 if (rom) {
     const bytes = new Uint8Array(16384);
     load(rom, 0, bytes);
@@ -51,6 +51,20 @@ if (line === 'usb') {
     host.onDeviceConnected = () => say('ready');
     host.onSerialData = out;
     send = (bytes) => bytes.forEach((byte) => host.sendSerialByte(byte));
+} else {
+    // The UART sends at once and never says that it is busy. Its FIFO is filled as fast as the rate allows.
+    const uart = chip.uart[1];
+    const queue = [];
+    const character = simulator.clock.createAlarm(() => {
+        uart.feedByte(queue.shift());
+        if (queue.length) character.schedule(11e9 / uart.baudRate);
+    });
+    uart.onByte = (byte) => out([byte]);
+    send = (bytes) => {
+        if (!queue.length) character.schedule(11e9 / uart.baudRate);
+        queue.push(...bytes);
+    };
+    setImmediate(() => say('ready'));
 }
 process.stdin.on('data', (bytes) => send(bytes));
 process.stdin.on('end', () => process.exit(0));
