@@ -285,6 +285,8 @@ $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversio
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
 $(BUILD)/$(1)/test_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
+$(BUILD)/$(1)/test_pico: $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico_uart mbm_pico_usb)
+$(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
 $(BUILD)/$(1)/test_porttest_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
 $(patsubst %,$(BUILD)/$(1)/%,test_stm32 test_porttest_stm32): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)

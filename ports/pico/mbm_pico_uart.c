@@ -5,7 +5,6 @@
 
 #include "hardware/gpio.h"
 #include "hardware/irq.h"
-#include "hardware/sync.h"
 #include "pico/time.h"
 
 enum { PINS = 30, SHORTEST_SLEEP = 20 /* microseconds */ };
@@ -19,7 +18,7 @@ static void receive(mbm_picoUart *line)
 {
     uart_hw_t *hw = uart_get_hw(line->uart);
 
-    while (!(hw->fr & UART_UARTFR_RXFE_BITS)) {
+    while (uart_is_readable(line->uart)) {
         uint32_t character = hw->dr;
 
         if (character & UART_UARTDR_OE_BITS)
@@ -33,14 +32,12 @@ static void receive(mbm_picoUart *line)
 
 static void send(mbm_picoUart *line)
 {
-    uart_hw_t *hw = uart_get_hw(line->uart);
-
-    while (line->next < line->end && !(hw->fr & UART_UARTFR_TXFF_BITS)) {
-        hw->dr = line->toSend[line->next];
+    while (line->next < line->end && uart_is_writable(line->uart)) {
+        uart_putc_raw(line->uart, (char)line->toSend[line->next]);
         line->next++;
     }
     if (line->next == line->end)
-        hw_clear_bits(&hw->imsc, UART_UARTIMSC_TXIM_BITS);
+        hw_clear_bits(&uart_get_hw(line->uart)->imsc, UART_UARTIMSC_TXIM_BITS);
 }
 
 static void interrupt(mbm_picoUart *line)

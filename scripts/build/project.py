@@ -75,6 +75,8 @@ WAYS = {
                                f"`make sdk` the C SDK, `{SDK}`."),
     "docs/guide-mcu.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=cortex-m4` writes "
                                "that for one board, `mbm-sdk-VERSION-cortex-m4.tar.gz`, in a minute"),
+    "docs/guide-pico.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=pico` writes "
+                               "that for one board, `mbm-sdk-VERSION-pico.tar.gz`, in a minute"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
     "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",
                               "No release is published yet: `cargo add mbm --path FOLDER` takes the crate from a clone of mbm, and "

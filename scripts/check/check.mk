@@ -63,7 +63,7 @@ KIT ?=
 FOLDER ?=
 BOARDS ?=
 .PHONY: check-real
-check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos or stm32, FOLDER=its folder
+check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, stm32 or pico, FOLDER=its folder
 	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi \
 		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm
 	@$(MAKE) --no-print-directory BOARDS= assembler $(BUILD)/plain/mbm

@@ -1,0 +1,1 @@
+#include "pico/time.h"

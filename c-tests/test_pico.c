@@ -1,0 +1,264 @@
+/* The port for the Raspberry Pi Pico, over a model of its UART and of TinyUSB. */
+#include "mbm_pico.h"
+#include "pico_model.h"
+#include "test.h"
+
+#include "hardware/irq.h"
+
+enum { DRIVER = 6, RECEIVED = 8 };
+
+static mbm_picoUart line;
+static mbm_picoUsb usb;
+static mbm_port port;
+static mbm_unit unit;
+static uint16_t words[120];
+static mbm_registerTable table;
+static mbm_server server;
+static uint8_t frame[MBM_MAX_FRAME];
+/* Reads registers 0 and 1 of unit 1, and the response. */
+static const uint8_t request[] = {1, 3, 0, 0, 0, 2, 0xC4, 0x0B};
+static const uint8_t response[] = {1, 3, 4, 2, 0x2B, 0, 100, 0x8A, 0x68};
+/* Reads 60 registers. Its response of 125 bytes is longer than TinyUSB's buffer. */
+static const uint8_t long_request[] = {1, 3, 0, 0, 0, 60, 0x45, 0xDB};
+
+static void set_up(void)
+{
+    pico_reset();
+    memset(&line, 0, sizeof line);
+    memset(&usb, 0, sizeof usb);
+    memset(&unit, 0, sizeof unit);
+    memset(&table, 0, sizeof table);
+    line.uart = uart1;
+    line.baud = 19200;
+    line.parity = UART_PARITY_EVEN;
+    line.txPin = 4;
+    line.rxPin = 5;
+    line.driverPin = DRIVER;
+    line.hasDriver = true;
+    words[0] = 555;
+    words[1] = 100;
+    table.words = words;
+    table.size = COUNT(words);
+    unit.id = 1;
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+}
+
+fixture each_test = {set_up, NULL}, all_tests;
+
+static void receive(const uint8_t *bytes, unsigned length)
+{
+    for (unsigned i = 0; i < length; i++)
+        pico_receive(bytes[i]);
+}
+
+/* --- UART */
+
+TEST(a_server_on_the_uart_answers_and_switches_the_driver_off_after_the_last_bit)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_setBaudRate(&server, line.baud));
+    receive(request, sizeof request);
+    for (int i = 0; i < 100 && chip.sent < sizeof response; i++, chip.now += 500) {
+        assert_true(mbm_server_poll(&server) >= MBM_OK);
+        /* As long as a character leaves, the driver is on. */
+        if (uart_get_hw(uart1)->fr & UART_UARTFR_BUSY_BITS)
+            assert_true(chip.pins[DRIVER]);
+        pico_send();
+    }
+    assert_int_equal(chip.sent, sizeof response);
+    assert_memory_equal(chip.line, response, sizeof response);
+    mbm_server_poll(&server);
+    assert_false(chip.pins[DRIVER]);
+}
+
+TEST(a_frame_longer_than_the_fifo_is_taken_whole_and_sent_by_the_interrupt)
+{
+    uint8_t bytes[MBM_MAX_FRAME];
+
+    for (unsigned i = 0; i < sizeof bytes; i++)
+        bytes[i] = (uint8_t)i;
+    OK(mbm_picoUart_open(&line, &port));
+    assert_int_equal(port.write(port.context, bytes, sizeof bytes), sizeof bytes);
+    assert_int_equal(port.write(port.context, bytes, sizeof bytes), 0);
+    assert_int_equal(port.flush(port.context), 0);
+    while (pico_send())
+        ;
+    assert_int_equal(chip.sent, sizeof bytes);
+    assert_memory_equal(chip.line, bytes, sizeof bytes);
+    assert_int_equal(port.flush(port.context), 1);
+}
+
+TEST(what_is_in_the_fifo_is_read_without_an_interrupt)
+{
+    uint8_t taken[RECEIVED];
+
+    OK(mbm_picoUart_open(&line, &port));
+    receive(request, 3);
+    assert_int_equal(port.read(port.context, taken, sizeof taken), 3);
+    assert_memory_equal(taken, request, 3);
+}
+
+TEST(an_overrun_of_the_fifo_is_counted)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    /* Another interrupt takes the processor. */
+    irq_set_enabled(UART1_IRQ, false);
+    for (unsigned i = 0; i < PICO_FIFO + 3; i++)
+        pico_receive('a');
+    irq_set_enabled(UART1_IRQ, true);
+    pico_idle();
+    pico_receive('b');
+    pico_idle();
+    assert_int_equal(line.overruns, 1);
+    assert_int_equal(mbm_ring_available(&line.ring), PICO_FIFO + 1);
+}
+
+TEST(bytes_that_the_program_reads_too_late_are_counted)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    for (unsigned i = 0; i < MBM_MAX_FRAME + 4; i++)
+        pico_receive('a');
+    assert_int_equal(mbm_picoUart_lost(&line), 4);
+    assert_int_equal(mbm_picoUart_lost(NULL), 0);
+}
+
+TEST(damaged_characters_are_counted_and_passed_on)
+{
+    uint8_t taken[RECEIVED];
+
+    OK(mbm_picoUart_open(&line, &port));
+    pico_receive('a' | UART_UARTDR_FE_BITS);
+    pico_receive('b' | UART_UARTDR_PE_BITS);
+    pico_receive(UART_UARTDR_BE_BITS | UART_UARTDR_FE_BITS);
+    assert_int_equal(port.read(port.context, taken, sizeof taken), 3);
+    assert_int_equal(line.damaged, 3);
+}
+
+TEST(a_uart_that_cannot_be_is_refused)
+{
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(NULL, &port));
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, NULL));
+    line.driverPin = 30;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    line.driverPin = DRIVER;
+    line.baud = 0;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    line.baud = 9600;
+    line.uart = NULL;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    line.uart = uart1;
+    OK(mbm_picoUart_open(&line, &port));
+    for (unsigned i = 0; i < 2; i++)
+        port.write(port.context, frame, sizeof frame);
+    IS(MBM_BUSY, mbm_picoUart_open(&line, &port));
+}
+
+/* --- USB */
+
+static void serve_usb(void)
+{
+    OK(mbm_picoUsb_open(&usb, &port));
+    OK(mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame));
+}
+
+/* A pass of the main loop of examples/pico/serve_usb.c. */
+static void turn(void)
+{
+    chip.now += 100;
+    if (mbm_server_poll(&server) == MBM_LINK_LOST)
+        mbm_server_beginRtuOverTcp(&server, &port, &unit, 1, frame, sizeof frame);
+}
+
+static void answers(void)
+{
+    chip.toHostLength = 0;
+    pico_from_host(request, sizeof request);
+    for (int i = 0; i < 10; i++)
+        turn();
+    assert_int_equal(chip.toHostLength, sizeof response);
+    assert_memory_equal(chip.toHost, response, sizeof response);
+}
+
+TEST(a_server_on_usb_answers)
+{
+    serve_usb();
+    answers();
+}
+
+TEST(after_the_cable_was_pulled_in_a_request_the_next_one_is_answered)
+{
+    serve_usb();
+    pico_from_host(request, 5);
+    turn();
+    chip.isUp = false;
+    IS(MBM_LINK_LOST, mbm_server_poll(&server));
+    turn();
+    chip.isUp = true;
+    answers();
+}
+
+TEST(after_the_host_closed_its_port_in_a_request_the_next_one_is_answered)
+{
+    serve_usb();
+    pico_from_host(request, 5);
+    turn();
+    chip.isOpen = false;
+    turn();
+    chip.isOpen = true;
+    answers();
+}
+
+TEST(a_host_that_does_not_set_dtr_is_answered)
+{
+    chip.isOpen = false;
+    serve_usb();
+    answers();
+}
+
+TEST(a_response_waits_for_a_host_that_does_not_read)
+{
+    serve_usb();
+    turn();
+    chip.reads = false;
+    pico_from_host(long_request, sizeof long_request);
+    for (int i = 0; i < 20; i++)
+        turn();
+    assert_int_equal(chip.toHostLength, 0);
+    chip.reads = true;
+    for (int i = 0; i < 20; i++)
+        turn();
+    assert_int_equal(chip.toHostLength, 125);
+    answers();
+}
+
+TEST(a_response_that_was_not_read_is_not_for_the_next_program)
+{
+    serve_usb();
+    turn();
+    chip.reads = false;
+    pico_from_host(request, sizeof request);
+    for (int i = 0; i < 10; i++)
+        turn();
+    chip.isOpen = false;
+    turn();
+    chip.isOpen = chip.reads = true;
+    answers();
+}
+
+TEST(a_program_may_call_tud_task_itself)
+{
+    usb.hasOwnTask = true;
+    serve_usb();
+    turn();
+    assert_int_equal(chip.tasks, 0);
+}
+
+TEST(a_serial_port_that_is_not_there_is_refused)
+{
+    usb.number = 1;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUsb_open(&usb, &port));
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUsb_open(NULL, &port));
+    usb.number = 0;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUsb_open(&usb, NULL));
+}
