@@ -8,6 +8,7 @@
 // - It answers each ready OUT endpoint within 10 us with an empty packet if it has no data. A real host sends nothing.
 import { createSetupPacket, DataDirection, DescriptorType, SetupRecipient, SetupRequest, SetupType } from 'rp2040js';
 
+const CONFIGURATION = 2; // the type of a descriptor
 const PACKET = 64;
 const TRANSFER = 128;
 const MILLISECOND = 1e6; // in nanoseconds
@@ -151,7 +152,7 @@ export class UsbHost {
             this.request(isIn, SetupType.Standard, SetupRecipient.Device, request, value, length, null, done);
         const ofClass = (request, value, data, done) => this.request(false, SetupType.Class, SetupRecipient.Interface,
             request, value, data ? data.length : 0, data, done);
-        const configuration = DescriptorType.Configration << 8;
+        const configuration = CONFIGURATION << 8;
         standard(true, SetupRequest.GetDescriptor, DescriptorType.Device << 8, 18);
         standard(false, SetupRequest.SetAddress, 1, 0);
         standard(true, SetupRequest.GetDescriptor, configuration, 9, (head) => {
