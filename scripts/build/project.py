@@ -77,6 +77,8 @@ WAYS = {
                                "that for one board, `mbm-sdk-VERSION-cortex-m4.tar.gz`, in a minute"),
     "docs/guide-pico.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=pico` writes "
                                "that for one board, `mbm-sdk-VERSION-pico.tar.gz`, in a minute"),
+    "docs/guide-freertos.md": guide("the C SDK", "mbm-sdk-VERSION-cortex-m3.tar.gz", "make sdk BOARDS=cortex-m3", quick=", in a minute"),
+    "docs/guide-stm32.md": guide("the C SDK", "mbm-sdk-VERSION-stm32f4.tar.gz", "make sdk BOARDS=stm32f4", quick=", in a minute"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
     "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",
                               "No release is published yet: `cargo add mbm --path FOLDER` takes the crate from a clone of mbm, and "

@@ -135,7 +135,7 @@ impl Count for usize {
 
 /// The memory of an engine or a server: a frame buffer, and counters.
 ///
-/// They keep every index and count within [`Storage::capacity`], so an implementation need not
+/// They keep every index and count within `capacity`, so an implementation need not
 /// check them.
 ///
 /// ```
@@ -190,7 +190,7 @@ pub trait Storage {
 }
 
 /// The memory of a master: transmit and response words beside the frame buffer. The engine
-/// uses at most [`Words::transmit_words`] and [`Words::response_words`] words.
+/// uses at most `transmit_words` and `response_words` words.
 ///
 /// ```
 /// use mbm::master::{Buffers, Words};

@@ -38,8 +38,8 @@ pub const MAX_FIELDS: usize = 16_383;
 /// by the fewest bits and registers. The time that it takes grows with n log n.
 ///
 /// # Errors
-/// As [`ReadLimits::check`]; [`Status::BUFFER_TOO_SMALL`] if `positions`, `reads` or `words` do
-/// not suffice, with the first field that does not fit.
+/// As [`Field::check`](super::Field::check); [`Status::BUFFER_TOO_SMALL`] if `positions`, `reads` or
+/// `words` do not suffice, with the first field that does not fit.
 /// [`Status::INVALID_ARGUMENT`] for no fields, for more than [`MAX_FIELDS`], and for an
 /// excluded range whose last address is less than its first.
 ///

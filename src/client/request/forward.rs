@@ -13,7 +13,7 @@ const LAST_SUB_FUNCTION: u16 = 0x14;
 
 impl RequestState {
     /// Makes the request that consists of `function` and `body`. Its data to send are the last
-    /// [`RequestState::data_length`] bytes of `body`. The data of its response are all bytes after
+    /// `data_length` bytes of `body`. The data of its response are all bytes after
     /// the function code, as on the wire. The response is validated as that of any request. The
     /// length of the response to a function that the standard does not define is known from the end
     /// of the frame.
