@@ -3,13 +3,15 @@
 
 mod common;
 
-use common::async_line::{poll, Delay, Line, CHARACTER, SILENCE, STEP};
+use common::async_line::{poll, Delay, Line, SILENCE, STEP};
+use common::async_server::{
+    in_each_framing, registers, server, stream, write, Server, FRAMINGS, LONG, UNIT,
+};
 use common::frame::{adu, framed, sealed};
 use mbm::frame::Framing;
 use mbm::pdu::request::Request;
 use mbm::pdu::response::Response;
-use mbm::port::AsyncIo;
-use mbm::server::{AsyncServer, AsyncUnits, Device, Indication, Reply, Tables, Unit, Units};
+use mbm::server::{AsyncUnits, Device, Indication, Reply, Unit, Units};
 use mbm::{Error, Exception};
 use std::future::{pending, Future};
 use std::pin::pin;
@@ -17,69 +19,6 @@ use std::pin::pin;
 use std::sync::{Arc, Mutex};
 #[cfg(feature = "std")]
 use std::task::Poll;
-
-const FRAMINGS: [Framing; 4] = [
-    Framing::Rtu,
-    Framing::Ascii,
-    Framing::Tcp,
-    Framing::RtuOverTcp,
-];
-
-const UNIT: u8 = 17;
-
-/// Longer than any frame here with its response.
-const LONG: u32 = 200_000;
-
-type Server<E = fn(bool)> =
-    AsyncServer<AsyncIo<Line, Box<dyn FnMut() -> u32 + Send>, Delay, E>, [u8; 600]>;
-
-/// A server on this line. On a serial line it has a driver.
-fn server(line: &Line, framing: Framing) -> Server<Box<dyn FnMut(bool) + Send>> {
-    let clock: Box<dyn FnMut() -> u32 + Send> = Box::new(line.clock());
-    let driver: Box<dyn FnMut(bool) + Send> = Box::new(line.driver());
-    let port = AsyncIo::serial_with_driver(line.clone(), clock, Delay(line.clone()), driver);
-    let mut server = AsyncServer::with_framing(framing, port, [0; 600]);
-    server.set_baud_rate(115_200);
-    server
-}
-
-/// A server on this connection.
-fn stream(line: &Line, framing: Framing) -> Server {
-    line.state().driver = true;
-    let clock: Box<dyn FnMut() -> u32 + Send> = Box::new(line.clock());
-    let port = AsyncIo::stream(line.clone(), clock, Delay(line.clone()));
-    AsyncServer::with_framing(framing, port, [0; 600])
-}
-
-type Registers = Unit<Tables<[bool; 0], [bool; 0], [u16; 10], [u16; 0]>>;
-
-/// Holding registers 107 to 116 of unit 17.
-fn registers() -> Registers {
-    let tables = Tables::NONE.with_holding_registers(107, [0; 10]);
-    Unit::new(UNIT, tables)
-}
-
-/// A write of register 107, whose response is the same.
-fn write(framing: Framing, value: u16) -> Vec<u8> {
-    let [high, low] = value.to_be_bytes();
-    framed(framing, value, UNIT, &[6, 0, 107, high, low])
-}
-
-/// Runs `test` with a server of each framing.
-macro_rules! in_each_framing {
-    ($framing:ident, $line:ident, $server:ident, $test:block) => {
-        for $framing in FRAMINGS {
-            let $line = Line::default();
-            if $framing.is_serial() {
-                let mut $server = server(&$line, $framing);
-                $test
-            } else {
-                let mut $server = stream(&$line, $framing);
-                $test
-            }
-        }
-    };
-}
 
 #[test]
 fn requests_that_arrive_byte_by_byte_or_in_blocks_are_answered_in_each_framing() {
@@ -357,198 +296,8 @@ fn a_step_is_one_request() {
     });
 }
 
-#[test]
-fn the_driver_is_on_from_the_first_byte_of_a_response_to_its_last() {
-    let line = Line::default();
-    let mut server = server(&line, Framing::Rtu);
-    let mut unit = registers();
-    let request = write(Framing::Rtu, 5);
-    line.arrive(0, &request);
-    let mut run = pin!(server.run(&mut unit));
-    for _ in 0..LONG / STEP {
-        assert!(poll(run.as_mut()).is_pending());
-        line.pass(STEP);
-        assert!(!line.state().driver || line.state().received.len() <= request.len());
-    }
-    assert!(!line.state().driver);
-    assert_eq!(line.state().switched, 2);
-    // What left while the driver was off would be missing.
-    assert_eq!(line.take(), request);
-}
-
-#[test]
-fn the_driver_stays_on_for_bytes_that_a_flush_has_left_in_the_hardware() {
-    for framing in [Framing::Rtu, Framing::Ascii] {
-        let line = Line::default();
-        line.state().flushes_early = true;
-        let mut server = server(&line, framing);
-        let mut unit = registers();
-        let request = write(framing, 5);
-        line.arrive(0, &request);
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), request, "{framing:?}");
-        assert!(!line.state().driver);
-    }
-}
-
 /// Runs a server until its driver is off again, and returns the time since the last byte.
-fn time_of_the_driver(post_flush_characters: u8) -> u32 {
-    let line = Line::default();
-    let mut server = server(&line, Framing::Rtu);
-    server.set_post_flush_hold(post_flush_characters);
-    let mut unit = registers();
-    let request = write(Framing::Rtu, 5);
-    line.arrive(0, &request);
-    let mut run = pin!(server.run(&mut unit));
-    while line.state().switched < 2 {
-        assert!(poll(run.as_mut()).is_pending());
-        line.pass(STEP);
-    }
-    let state = line.state();
-    let last = state.received.last().expect("a response").0;
-    state.now.wrapping_sub(last)
-}
-
-#[test]
-fn the_driver_goes_off_a_character_after_the_last_byte_or_after_the_hold() {
-    assert!(time_of_the_driver(0) <= CHARACTER + 3 * STEP);
-    let held = time_of_the_driver(7);
-    assert!(
-        (7 * CHARACTER..=7 * CHARACTER + 3 * STEP).contains(&held),
-        "{held}"
-    );
-}
-
 /// Runs the server until the client has received so many bytes of a response.
-fn run_until_sent(line: &Line, bytes: usize, future: impl Future) {
-    let mut future = pin!(future);
-    for _ in 0..LONG / STEP {
-        assert!(poll(future.as_mut()).is_pending());
-        if line.state().received.len() == bytes {
-            return;
-        }
-        line.pass(STEP);
-    }
-    panic!("{bytes} bytes are not sent");
-}
-
-#[test]
-fn the_driver_goes_off_when_the_future_is_dropped_in_the_middle_of_a_response() {
-    for (space, per_write) in [(usize::MAX, usize::MAX), (1, 1)] {
-        let line = Line::default();
-        line.state().space = space;
-        line.state().per_write = per_write;
-        let mut server = server(&line, Framing::Rtu);
-        let mut unit = registers();
-        line.arrive(0, &write(Framing::Rtu, 5));
-        run_until_sent(&line, 3, server.run(&mut unit));
-        assert!(!line.state().driver);
-        // Seconds later the line may belong to others: nothing is sent any more.
-        line.pass(5_000_000);
-        line.take();
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), []);
-        assert!(!line.state().driver);
-        let request = write(Framing::Rtu, 6);
-        line.arrive(0, &request);
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), request);
-    }
-}
-
-#[test]
-fn a_response_whose_future_is_dropped_goes_on_if_the_server_runs_again_at_once() {
-    for per_write in [1, usize::MAX] {
-        in_each_framing!(framing, line, server, {
-            line.state().space = per_write;
-            line.state().per_write = per_write;
-            let mut unit = registers();
-            for value in [1, 2] {
-                let request = write(framing, value);
-                line.arrive(0, &request);
-                // A select whose other branch is ready at each poll.
-                for _ in 0..LONG / STEP {
-                    assert_eq!(line.run_for(STEP / 2, server.run(&mut unit)), None);
-                }
-                assert_eq!(line.take(), request, "{framing:?}, {per_write}");
-            }
-        });
-    }
-}
-
-#[test]
-fn a_response_of_which_a_stream_has_taken_a_part_is_finished_however_late() {
-    for framing in [Framing::Tcp, Framing::RtuOverTcp] {
-        let line = Line::default();
-        line.state().space = 1;
-        let mut server = stream(&line, framing);
-        let mut unit = registers();
-        let requests = [write(framing, 1), write(framing, 2)].concat();
-        line.arrive(0, &requests);
-        run_until_sent(&line, 3, server.run(&mut unit));
-        line.pass(60_000_000);
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), requests, "{framing:?}");
-    }
-}
-
-#[test]
-fn a_response_that_was_not_begun_is_sent_unless_the_client_has_sent_again() {
-    for is_again in [false, true] {
-        let line = Line::default();
-        line.state().space = 0;
-        let mut server = server(&line, Framing::Rtu);
-        let mut unit = registers();
-        line.arrive(0, &write(Framing::Rtu, 5));
-        assert_eq!(line.run_for(20_000, server.run(&mut unit)), None);
-        assert_eq!(line.state().switched, 2);
-        line.state().space = usize::MAX;
-        let mut expected = write(Framing::Rtu, 5);
-        if is_again {
-            expected = write(Framing::Rtu, 6);
-            line.arrive(0, &expected);
-            line.pass(20 * CHARACTER);
-        }
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), expected);
-    }
-}
-
-#[test]
-fn a_request_that_has_arrived_in_part_outlives_its_future() {
-    in_each_framing!(framing, line, server, {
-        let mut unit = registers();
-        let request = write(framing, 7);
-        line.arrive(0, &request[..5]);
-        assert_eq!(line.run_for(5 * CHARACTER, server.run(&mut unit)), None);
-        line.arrive(0, &request[5..]);
-        assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-        assert_eq!(line.take(), request, "{framing:?}");
-    });
-}
-
-#[test]
-fn a_future_that_is_forgotten_leaves_the_server_usable() {
-    let line = Line::default();
-    let mut server = server(&line, Framing::Rtu);
-    let mut unit = registers();
-    line.arrive(0, &write(Framing::Rtu, 5));
-    let mut run = Box::pin(server.run(&mut unit));
-    while line.state().received.len() < 3 {
-        assert!(poll(run.as_mut()).is_pending());
-        line.pass(STEP);
-    }
-    std::mem::forget(run);
-    line.pass(1_000_000);
-    line.take();
-    let mut unit = registers();
-    let request = write(Framing::Rtu, 6);
-    line.arrive(2 * SILENCE, &request);
-    assert_eq!(line.run_for(LONG, server.run(&mut unit)), None);
-    assert_eq!(line.take(), request);
-    assert!(!line.state().driver);
-}
-
 #[test]
 fn a_uart_that_takes_no_byte_costs_one_response() {
     let line = Line::default();

@@ -3,6 +3,9 @@
 #[cfg(feature = "embedded-io-async")]
 #[allow(dead_code)]
 pub mod async_line;
+#[cfg(feature = "embedded-io-async")]
+#[allow(dead_code, unused_imports, unused_macros)]
+pub mod async_server;
 #[allow(dead_code)]
 pub mod device;
 pub mod frame;
