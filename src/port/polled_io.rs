@@ -17,6 +17,9 @@ use embedded_io_async::{Read, Write};
 /// `RingBufferedUartRx`), and so does a socket. A UART that begins a DMA transfer in the future does
 /// not, and neither does a stream with TLS.
 ///
+/// On tokio, poll on a thread of its own (`spawn_blocking`): in a task tokio lets a device succeed only 128
+/// times between two awaits, and then it seems silent.
+///
 /// `clock` returns the time in microseconds, which wraps at 2^32. Some UARTs end a flush before the
 /// last byte has left, so set the baud rate: `settings().set_baud_rate(..)`.
 ///

@@ -1,8 +1,14 @@
 //! The programs against servers of pymodbus and libmodbus, and clients of pymodbus.
 #![cfg(feature = "pymodbus")]
 
+use embedded_io_adapters::tokio_1::FromTokio;
+use mbm::client::BlockingClient;
+use mbm::port::PolledIo;
+use mbm::Error;
+use mbm_host_example::micros;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, ChildStdout, Command, Stdio};
+use tokio::net::TcpStream;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../..");
 
@@ -194,6 +200,33 @@ fn two_tasks_share_a_connection_to_a_libmodbus_server() {
             || line.ends_with("no reply in time")
     };
     assert!(printed.lines().all(is_right), "{printed}");
+}
+
+/// A client that blocks polls the futures of the socket, on a thread of its own: in a task tokio lets only 128
+/// reads and writes succeed between two awaits.
+#[tokio::test]
+async fn a_polled_socket_of_tokio_writes_and_reads_a_libmodbus_server_400_times() {
+    let server = Peer::start(&format!("{ROOT}/build/plain/serve_libmodbus"), &[]);
+    let address = format!("127.0.0.1:{}", server.words()[2]);
+    let socket = TcpStream::connect(address).await.expect("a connection");
+    let port = PolledIo::stream(FromTokio::new(socket), micros);
+    let mut client = BlockingClient::tcp(port);
+    let requests = tokio::task::spawn_blocking(move || {
+        for round in 0..400 {
+            let words = [round, !round];
+            client
+                .write_multiple_registers(17, 107, &words)
+                .expect("the registers are written");
+            assert_eq!(client.holding_registers(17, 107), Ok(words));
+        }
+        assert_eq!(
+            client.holding_registers::<1>(17, 0xFFFF),
+            Err(Error::IllegalDataAddress)
+        );
+        drop(server);
+        assert_eq!(client.holding_registers::<2>(17, 107), Err(Error::LinkLost));
+    });
+    requests.await.expect("the requests are right");
 }
 
 /// What a program in Python prints.
