@@ -3,6 +3,7 @@
 import importlib.machinery
 import importlib.util
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -106,7 +107,7 @@ class Header(unittest.TestCase):
                                    text=True, input=f'#include "{file}"\n#include "{file}"\nint main(void);\n')
 
     def test_the_functions_of_a_part_are_those_that_it_declares(self):
-        self.assertEqual({name for name in single.functions(["ring"]) if name.startswith("mbm_ring_")}, single.functions(["ring"]))
+        self.assertEqual({re.match("mbm_[a-zA-Z]+_", name)[0] for name in single.functions(["ring"])}, {"mbm_ring_", "mbm_dmaRing_"})
         exports = subprocess.run([ROOT / "scripts/build/exports"], check=True, text=True, capture_output=True).stdout.split()
         self.assertEqual(single.functions(single.all_parts()), set(exports))
 
