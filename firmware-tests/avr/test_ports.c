@@ -3,6 +3,8 @@
 #include "sketch.h"
 #include "test.h"
 
+#include <stdio.h>
+
 enum { LONGEST = 60000 /* ms */ };
 
 TEST(the_ports_of_the_classes_pass)
@@ -15,7 +17,8 @@ TEST(the_ports_of_the_classes_pass)
     board_loop(b, '1');
     for (unsigned ms = 0; ms < LONGEST && board_byte(b, ended) == 0; ms += 500)
         assert_true(board_run(b, 500ull * MS));
-    print_message("%s\n", printed.text);
+    /* print_message cuts a text of more than 1024 characters, and its last line with it. */
+    puts(printed.text);
     assert_int_equal(board_byte(b, ended), 1);
     board_free(b);
 }
