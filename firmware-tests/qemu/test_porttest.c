@@ -7,11 +7,10 @@
 #include "pty.h"
 #include "test.h"
 
-#include <stdio.h>
-
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <stdio.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
