@@ -174,7 +174,8 @@ TEST(a_blocking_call_sleeps_until_bytes_come_and_does_not_poll)
         is_right();
     /* Bytes come one by one at most: 25 of a reply, and the sleeps of the gap and of the frame. */
     assert_in_range(freertos_sleeps, times, times * 40);
-    assert_in_range(freertos_given, times, freertos_sleeps);
+    /* One that comes before the task sleeps ends no sleep, so there may be more of them. */
+    assert_in_range(freertos_given, times, times * 40);
     assert_int_equal(freertos_yields, 0);
     assert_int_equal(mbm_freertos_lost(&uart), 0);
 }
