@@ -16,10 +16,9 @@ need-packages:
 
 # The parts of an SDK for some boards alone: theirs, and the library for this machine.
 .PHONY: sdk-parts
-sdk-parts: export MBM_BOARDS := $(BOARDS)
 sdk-parts:
 	@scripts/need gcc libc6-dev libmbedtls-dev
-	@archives=$$(scripts/build/boards.py --archives) && scripts/build/archive --packages $$archives && \
+	@archives=$$(MBM_BOARDS="$(BOARDS)" scripts/build/boards.py --archives) && scripts/build/archive --packages $$archives && \
 		$(MAKE) --no-print-directory -j$$(nproc) linux assembler $$(printf 'build-archive-%s ' $$archives)
 
 .PHONY: dist-parts
@@ -39,7 +38,7 @@ PARTS_esp-idf := assembler BOARDS="riscv esp32"
 PARTS_platformio := $(ARCHIVE) assembler
 PARTS_rt-thread := assembler BOARDS="arm riscv"
 PARTS_sbom := $(ARCHIVE)
-PARTS_sdk := $(if $(BOARDS),sdk-parts BOARDS="$(BOARDS)",dist-parts)
+PARTS_sdk = $(if $(BOARDS),sdk-parts,dist-parts)
 PARTS_source :=
 PARTS_zephyr := assembler BOARDS="arm riscv"
 KIND ?=
@@ -49,14 +48,12 @@ package: ## Write the packages of one kind to dist/, KIND=arduino, crates, debia
 	@[ -n "$(filter $(KIND),$(PACKAGE_KINDS))" ] || { echo "package: KIND is one of $(PACKAGE_KINDS)" >&2; exit 1; }
 	@$(if $(PARTS_$(KIND)),$(MAKE) --no-print-directory $(PARTS_$(KIND)))
 	@mkdir -p dist
-	@packaging/$(KIND)/pack dist
+	@MBM_BOARDS="$(BOARDS)" packaging/$(KIND)/pack dist
 
 # The packages that people ask for by name. BOARDS are boards, families of boards or archives.
-BOARDS ?=
 .PHONY: sdk deb single
-sdk: export MBM_BOARDS := $(BOARDS)
 sdk: ## Write the C SDK to dist/; BOARDS="uno cortex-m4" for these boards alone
-	@$(MAKE) --no-print-directory package KIND=sdk BOARDS="$(BOARDS)"
+	@$(MAKE) --no-print-directory package KIND=sdk
 
 deb: ## Write the Debian packages of this machine to dist/: mbm, libmbm0 and libmbm-dev
 	@$(MAKE) --no-print-directory package KIND=debian
@@ -66,7 +63,7 @@ PARTS ?=
 single: ## Write mbm.h and mbm.S, the library for BOARD in two files, to dist/single; PARTS="master ring": these headers alone
 	@[ "$(BOARD)" ] || { echo "single: BOARD is one of $$(scripts/build/boards.py --list)" >&2; exit 1; }
 	@$(MAKE) --no-print-directory assembler BOARDS="$(BOARD)"
-	@scripts/build/single $(BOARD) "dist/single/$(BOARD)$(if $(PARTS),-$(subst $(eval ) ,-,$(strip $(PARTS))))" $(PARTS)
+	@scripts/build/single $(BOARD) dist/single/$$(echo $(BOARD) $(PARTS) | tr " " -) $(PARTS)
 
 KINDS ?=
 .PHONY: check-dist

@@ -27,6 +27,9 @@ class Set(NamedTuple):
     guard: str
     what: str
 
+    def archives(self) -> list:
+        return [self.mcu, *self.others.split()]
+
 
 SETS = {
     "avr5": Set("atmega328p", "atmega168 atmega32u4", "avr", "defined(__AVR_ARCH__) && (__AVR_ARCH__ == 5 || __AVR_ARCH__ == 51)",
@@ -99,11 +102,11 @@ TAKEN = {
 
 def set_of(archive: str) -> str:
     """The instruction set whose file serves the boards of an archive."""
-    return next(name for name, row in SETS.items() if archive in [row.mcu, *row.others.split()])
+    return next(name for name, row in SETS.items() if archive in row.archives())
 
 
 def archives() -> list:
-    return [archive for row in SETS.values() for archive in [row.mcu, *row.others.split()]]
+    return [archive for row in SETS.values() for archive in row.archives()]
 
 
 def plain(name: str) -> str:
@@ -113,8 +116,8 @@ def plain(name: str) -> str:
 
 def archive_of(board: str) -> str | None:
     """The archive for a board, which may be named by its archive itself; None if there is no such board."""
-    every = {name: archive for archive in archives() for name in [archive, *BOARDS.get(archive, "").split()]}
-    return next((archive for name, archive in every.items() if plain(name) == plain(board)), None)
+    return next((archive for archive in archives() for name in [archive, *BOARDS.get(archive, "").split()]
+                 if plain(name) == plain(board)), None)
 
 
 def names() -> list:
@@ -158,9 +161,7 @@ def named_archives() -> list:
     built = subprocess.run([FOLDER / "archive", "--list"], check=True, text=True, stdout=subprocess.PIPE).stdout.split()
     chosen = []
     for word in named():
-        which = [SETS[name] for name in set_names(word)]
-        chosen += [archive_of(word)] if word not in FAMILIES else \
-            [archive for row in which for archive in [row.mcu, *row.others.split()]]
+        chosen += [archive for name in set_names(word) for archive in SETS[name].archives()] if word in FAMILIES else [archive_of(word)]
     taken = [TAKEN.get(archive, archive) for archive in chosen]
     return [archive for archive in built if archive in taken or not named()]
 

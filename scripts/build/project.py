@@ -52,8 +52,10 @@ class Way(NamedTuple):
 RELEASE = "from the [latest release](ADDRESS/releases/latest)"
 
 
-def guide(what: str, file: str, command: str, more: str = "", quick: str = "") -> Way:
-    """`quick` says how a reader gets the part for one board in less time."""
+def guide(what: str, file: str, command: str, more: str = "", board: str = "") -> Way:
+    """`board` is an example of a board for which the command makes the package alone, in less time."""
+    quick = (f", in a quarter of an hour; `{command} BOARDS={board}` writes that for one board, "
+             f"`{file.replace('VERSION', f'VERSION-{board}')}`, in a minute") if board else ""
     return Way(f"Download {what}, `{file}`,{more} {RELEASE}.",
                f"No release is published yet: in a clone of mbm, `{command}` writes {what}, `{file}`, to the folder `dist`{quick}.")
 
@@ -64,21 +66,17 @@ WAYS = {
                      "No release is published yet: **[make the packages from a clone](#install)**, then start with"),
     "docs/index.md": Way("**[Download](ADDRESS/releases/latest)** then start with",
                          "**[Make it from a clone](../README.md#install)** as no release is published yet, then start with"),
-    "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip", quick=", in a quarter of an "
-                                   "hour; `make arduino-zip BOARDS=uno` writes that for one board, `mbm-arduino-VERSION-uno.zip`, in a "
-                                   "minute"),
+    "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip", board="uno"),
     "docs/guide-esp-idf.md": guide("the component", "mbm-esp-idf-VERSION.tar.gz", "make package KIND=esp-idf"),
     "docs/guide-platformio.md": guide("the package", "mbm-platformio-VERSION.tar.gz", "make package KIND=platformio"),
     "docs/guide-linux.md": Way(f"Download the C SDK, `{SDK}`, or the Debian packages `libmbm-dev` and `libmbm0`, {RELEASE}.",
                                "No release is published yet: in a clone of mbm, `make install` installs the library, "
                                "`make deb` writes the Debian packages `libmbm-dev` and `libmbm0` to the folder `dist`, and "
                                f"`make sdk` the C SDK, `{SDK}`."),
-    "docs/guide-mcu.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=cortex-m4` writes "
-                               "that for one board, `mbm-sdk-VERSION-cortex-m4.tar.gz`, in a minute"),
-    "docs/guide-pico.md": guide("the C SDK", SDK, "make sdk", quick=", in a quarter of an hour; `make sdk BOARDS=pico` writes "
-                               "that for one board, `mbm-sdk-VERSION-pico.tar.gz`, in a minute"),
-    "docs/guide-freertos.md": guide("the C SDK", "mbm-sdk-VERSION-cortex-m3.tar.gz", "make sdk BOARDS=cortex-m3", quick=", in a minute"),
-    "docs/guide-stm32.md": guide("the C SDK", "mbm-sdk-VERSION-stm32f4.tar.gz", "make sdk BOARDS=stm32f4", quick=", in a minute"),
+    "docs/guide-mcu.md": guide("the C SDK", SDK, "make sdk", board="cortex-m4"),
+    "docs/guide-pico.md": guide("the C SDK", SDK, "make sdk", board="pico"),
+    "docs/guide-freertos.md": guide("the C SDK", SDK, "make sdk", board="cortex-m3"),
+    "docs/guide-stm32.md": guide("the C SDK", SDK, "make sdk", board="stm32f4"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
     "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",
                               "No release is published yet: `cargo add mbm --path FOLDER` takes the crate from a clone of mbm, and "
