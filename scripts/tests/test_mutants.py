@@ -1,18 +1,13 @@
 """Tests of scripts/check/mutants: which places of a source it changes, how it finds them again, in which order it runs
 tests, and what it says of the outcome. No compiler runs: a tree here reads its changed file in place of the tests."""
-import importlib.machinery
-import importlib.util
 import pathlib
-import sys
 import tempfile
 import unittest
 import unittest.mock
 
-ROOT = pathlib.Path(__file__).parents[2]
-sys.dont_write_bytecode = True
-loader = importlib.machinery.SourceFileLoader("mutants", str(ROOT / "scripts/check/mutants"))
-mutants = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
-loader.exec_module(mutants)
+from loading import ROOT, load
+
+mutants = load("scripts/check/mutants")
 
 SOURCE = '''//! 1 + 2 in a comment
 #[cfg(test)]

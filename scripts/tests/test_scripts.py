@@ -4,8 +4,6 @@ in scripts/build/archive. `make test-scripts` has the
 library for the SBOM."""
 import contextlib
 import copy
-import importlib.machinery
-import importlib.util
 import os
 import pathlib
 import shutil
@@ -15,17 +13,7 @@ import tempfile
 import unittest
 import unittest.mock
 
-ROOT = pathlib.Path(__file__).parents[2]
-
-
-def load(path):
-    """Loads a script, which may have no ending, as a module."""
-    sys.dont_write_bytecode = True
-    loader = importlib.machinery.SourceFileLoader(pathlib.Path(path).name.replace("-", "_"), str(ROOT / path))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
-    loader.exec_module(module)
-    return module
-
+from loading import ROOT, load
 
 # --- scripts/check/functions: a question changes nothing
 

@@ -1,26 +1,14 @@
 """The tests of scripts/build/single, the library as two files."""
 
-import importlib.machinery
-import importlib.util
 import pathlib
 import re
 import subprocess
-import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from loading import ROOT, load
 
-
-def load():
-    sys.dont_write_bytecode = True
-    loader = importlib.machinery.SourceFileLoader("single", str(ROOT / "scripts/build/single"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
-    loader.exec_module(module)
-    return module
-
-
-single = load()
+single = load("scripts/build/single")
 
 SOURCE = """\
 \t.syntax\tunified
