@@ -28,7 +28,9 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # The test kit for ports, and its own tests.
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
-PORT_TESTS := $(filter test_porttest% test_freertos%,$(TESTS))
+FREERTOS_TESTS := $(filter test_freertos%,$(TESTS))
+STM32_TESTS := test_stm32 test_porttest_stm32
+PORT_TESTS := $(filter test_porttest%,$(TESTS)) $(FREERTOS_TESTS)
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
@@ -284,13 +286,12 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
-$(BUILD)/$(1)/test_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
 $(BUILD)/$(1)/test_pico: $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico_uart mbm_pico_usb)
 $(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
-$(BUILD)/$(1)/test_porttest_stm32: $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
-$(patsubst %,$(BUILD)/$(1)/%,test_stm32 test_porttest_stm32): INCLUDES += -Ic-tests/stm32 -Iports/stm32
+$(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model mbm_stm32 mbm_stm32_callbacks)
+$(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
-$(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_freertos*.c)): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c))
+$(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c))
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)
