@@ -96,7 +96,7 @@ const char *number_time_text(uint32_t milliseconds, char text[32])
 /* --- words --- */
 
 enum {
-    MANY_WORDS = 30, /* a sentence lists up to so many words, and of more the nearest */
+    MANY_WORDS = 30, /* a sentence lists at most 30 words; of more words it lists the nearest */
     NEAREST = 4,
     FIRST = 10,
     LONGEST_WORD = 40
