@@ -141,19 +141,29 @@ static void count_overrun(mbm_stm32Line *line)
     __HAL_UART_CLEAR_OREFLAG(line->uart);
 }
 
-/* An error that is still set would end reception at once. */
-static void clear_errors(mbm_stm32Line *line)
+/* Counts an overrun. Returns 1 if a framing, noise or parity error is set. */
+static uint8_t note_flags(mbm_stm32Line *line)
 {
-    UART_HandleTypeDef *uart = line->uart;
+    const UART_HandleTypeDef *uart = line->uart;
 
     if (__HAL_UART_GET_FLAG(uart, UART_FLAG_ORE))
         count_overrun(line);
-#ifdef UART_CLEAR_FEF
-    __HAL_UART_CLEAR_FLAG(uart, UART_CLEAR_FEF | UART_CLEAR_NEF | UART_CLEAR_PEF);
-#else
     if (__HAL_UART_GET_FLAG(uart, UART_FLAG_FE) || __HAL_UART_GET_FLAG(uart, UART_FLAG_NE) ||
         __HAL_UART_GET_FLAG(uart, UART_FLAG_PE))
-        __HAL_UART_CLEAR_PEFLAG(uart);
+        return 1;
+    return 0;
+}
+
+/* An error that is still set would end reception at once. */
+static void clear_errors(mbm_stm32Line *line)
+{
+#ifdef UART_CLEAR_FEF
+    if (__HAL_UART_GET_FLAG(line->uart, UART_FLAG_ORE))
+        count_overrun(line);
+    __HAL_UART_CLEAR_FLAG(line->uart, UART_CLEAR_FEF | UART_CLEAR_NEF | UART_CLEAR_PEF);
+#else
+    if (note_flags(line))
+        __HAL_UART_CLEAR_PEFLAG(line->uart);
 #endif
 }
 
@@ -195,20 +205,14 @@ static int16_t receive_again(mbm_stm32Line *line)
 /* Counts the errors since the last call, where no interrupt does. */
 static void count_flags(mbm_stm32Line *line)
 {
-    UART_HandleTypeDef *uart = line->uart;
-    uint16_t flags = 0;
+    const uint16_t flags = note_flags(line);
 
-    if (__HAL_UART_GET_FLAG(uart, UART_FLAG_ORE))
-        count_overrun(line);
-    if (__HAL_UART_GET_FLAG(uart, UART_FLAG_FE) || __HAL_UART_GET_FLAG(uart, UART_FLAG_NE) ||
-        __HAL_UART_GET_FLAG(uart, UART_FLAG_PE))
-        flags = 1;
     if (flags > line->flags)
         line->faulty++;
     line->flags = flags;
 #ifdef UART_CLEAR_FEF
     /* Elsewhere the DMA clears them when it reads the next character. */
-    __HAL_UART_CLEAR_FLAG(uart, UART_CLEAR_FEF | UART_CLEAR_NEF | UART_CLEAR_PEF);
+    __HAL_UART_CLEAR_FLAG(line->uart, UART_CLEAR_FEF | UART_CLEAR_NEF | UART_CLEAR_PEF);
     line->flags = 0;
 #endif
 }
@@ -244,16 +248,22 @@ static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
 
 /* --- transmission */
 
+/* Counts a transmission that the HAL has ended before its last bit. The next call reports it. */
+static void stall(mbm_stm32Line *line)
+{
+    line->isSending = 0;
+    line->hasFailed = 1;
+    line->stalled++;
+    driver_off(line);
+}
+
 /* Aborts a transmission that takes too long. */
 static void end_if_overdue(mbm_stm32Line *line)
 {
     if (!line->isSending || HAL_GetTick() - line->sentAt < line->sendingTime)
         return;
     (void)HAL_UART_AbortTransmit(line->uart);
-    line->isSending = 0;
-    line->hasFailed = 1;
-    line->stalled++;
-    driver_off(line);
+    stall(line);
 }
 
 static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -380,12 +390,8 @@ void mbm_stm32_noteError(UART_HandleTypeDef *uart)
     }
     /* The HAL has ended a transmission whose DMA failed. */
     if (line->isSending && (uart->ErrorCode & HAL_UART_ERROR_DMA) != 0u &&
-        uart->gState == HAL_UART_STATE_READY) {
-        line->isSending = 0;
-        line->hasFailed = 1;
-        line->stalled++;
-        driver_off(line);
-    }
+        uart->gState == HAL_UART_STATE_READY)
+        stall(line);
     wake(line);
 }
 
