@@ -106,8 +106,8 @@ uint16_t mbm_freertos_lost(const mbm_freertosUart *uart);
 
 /**
  * Returns how many frames did not leave: the UART is not started, or its interrupt is not enabled.
- * What is left of such a frame is given up when its request ends (MBM_LINE_BUSY), or a second after
- * its time; it never leaves later.
+ * What is left of such a frame is given up: when the request ends (MBM_LINE_BUSY), or, of a
+ * server's response, three seconds after its time. It never leaves later.
  *
  * @return frames since mbm_freertos_open; it wraps at 65536. 0 for NULL
  */

@@ -64,7 +64,7 @@ extern "C" {
 /** What mbm_stm32_open returns; mbm_stm32_text has a sentence for each. */
 enum {
     MBM_STM32_OK,
-    MBM_STM32_NULL,         /**< a pointer is NULL, or a buffer has no size */
+    MBM_STM32_NULL,         /**< a pointer is NULL */
     MBM_STM32_OPEN,         /**< the line is open, or another line has this UART */
     MBM_STM32_NOT_STARTED,  /**< the UART is not initialised */
     MBM_STM32_BUSY,         /**< another part of the program sends or receives */
@@ -72,7 +72,7 @@ enum {
     MBM_STM32_RECEIVE_DMA,  /**< the DMA of reception is not circular, or not of bytes */
     MBM_STM32_TRANSMIT_DMA, /**< the DMA of transmission is not normal, or not of bytes */
     MBM_STM32_MEMORY,       /**< the DMA does not reach the memory of the line */
-    MBM_STM32_PIN,          /**< the driver's pin cannot be switched */
+    MBM_STM32_PIN,          /**< the driver's pin has no number */
     MBM_STM32_RECEPTION     /**< the HAL does not start reception */
 };
 
