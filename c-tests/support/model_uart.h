@@ -60,8 +60,8 @@ typedef struct model_uart {
     uint32_t stepUs;    /* of its clock */
     uint16_t txBuffer;  /* bytes that write can hand over */
     uint16_t ring;      /* bytes that the receiver holds */
-    uint16_t block;     /* bytes that it hands over at once; 1: each */
-    uint32_t idleChars; /* and after so many characters of silence */
+    uint16_t block;     /* the receiver hands over so many bytes at once; 1: each */
+    uint32_t idleChars; /* after this silence, in characters, it hands over fewer */
     uint8_t ownDriver;  /* the UART switches the driver itself */
     uint8_t holdsBack;  /* the sender waits while the receiver is full, as over USB and TCP */
     model_fault fault;

@@ -18,8 +18,8 @@ typedef struct talker {
     const talk *says; /* again and again */
     size_t at;
     size_t piece;        /* how many bytes a read returns at most */
-    size_t each;         /* a connection is lost after so many bytes; 0: never */
-    size_t left;         /* how many bytes are left until then */
+    size_t each;         /* bytes of a connection until it is lost; 0: no limit */
+    size_t left;         /* how many of them are left */
     unsigned reads;      /* since the last poll began */
     unsigned most_reads; /* the most reads of one poll */
     uint32_t *clock;
