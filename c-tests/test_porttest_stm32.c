@@ -1,13 +1,12 @@
 /* The port for STM32 in the test kit for ports, on a chip that is played. TX is wired to RX. */
 #include "mbm_porttest.h"
-#include "mbm_stm32.h"
 
 #include "machine.h"
 #include "test.h"
+#include "uart.h"
 
 static mbm_portTest test;
-static mbm_stm32Line uart;
-static mbm_port port, watched;
+static mbm_port watched;
 
 /* The clock goes on while the program looks at it. */
 static uint32_t micros(void *context)
@@ -55,13 +54,10 @@ static void say(void *context, mbm_portFinding kind, const char *sentence)
 
 static void passes(uint8_t byDma)
 {
-    machine_start(byDma, byDma);
-    memset(&uart, 0, sizeof uart);
+    uart_start(byDma);
     memset(&test, 0, sizeof test);
     m.isLooped = 1;
-    uart.driverPort = GPIOA;
-    uart.driverPin = GPIO_PIN_8;
-    assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
+    uart_open();
     watched = port;
     watched.micros = micros;
     test.port = &watched;

@@ -1,16 +1,13 @@
 /* The port for STM32 on a chip that is played: at every position of the DMA, with errors at every
- * character, before a quick device, and with every fault of a program or a board. With
- * MBM_STM32_HAL set by the compiler, the chip has ST's HAL: see scripts/check/real_stm32.py. */
-#include "mbm_stm32.h"
-
+ * character, before a quick device, and with every fault of a program or a board.
+ * scripts/check/real_stm32.py runs these tests with ST's HAL. */
 #include "crc.h"
 #include "machine.h"
 #include "test.h"
+#include "uart.h"
 
 enum { UNIT = 17, TIMEOUT = 100 /* ms */ };
 
-static mbm_stm32Line uart;
-static mbm_port port;
 static mbm_line line;
 static mbm_node node;
 static uint16_t words[125];
@@ -58,21 +55,17 @@ static void device(void)
 
 static void start(uint8_t byDma)
 {
-    machine_start(byDma, byDma);
-    mbm_stm32_close(&uart);
-    memset(&uart, 0, sizeof uart);
+    uart_start(byDma);
     memset(&line, 0, sizeof line);
     memset(&node, 0, sizeof node);
     answered = pause = faultyAt = errors = 0;
     isMute = 0;
     m.device = device;
-    uart.driverPort = GPIOA;
-    uart.driverPin = GPIO_PIN_8;
 }
 
 static void open_line(void)
 {
-    assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
+    uart_open();
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
     OK(mbm_line_setBaudRate(&line, huart1.Init.BaudRate));
     OK(mbm_node_begin(&node, &line, UNIT, words, 125, NULL, 0));
@@ -80,10 +73,23 @@ static void open_line(void)
     OK(mbm_node_setBlocking(&node, 0));
 }
 
-/* Reads registers, with a main loop that comes every `step` microseconds. */
-static uint8_t read_words(uint16_t address, uint16_t quantity, uint32_t step)
+/* Begins to read registers, and polls every `step` microseconds until so many characters of the
+ * request have left. */
+static uint8_t begin_read(uint16_t address, uint16_t quantity, unsigned characters, uint32_t step)
 {
+    unsigned end = m.sentCount + characters;
     uint8_t status = mbm_node_readHoldingRegisters(&node, address, quantity);
+
+    while (m.sentCount < end) {
+        machine_run(step);
+        status = mbm_node_poll(&node);
+    }
+    return status;
+}
+
+/* Polls every `step` microseconds until a request has ended, whose status now is `status`. */
+static uint8_t end_read(uint8_t status, uint32_t step)
+{
     uint64_t end = m.now + 5000000000u;
 
     while (status == MBM_PENDING) {
@@ -95,19 +101,18 @@ static uint8_t read_words(uint16_t address, uint16_t quantity, uint32_t step)
     return status;
 }
 
+/* Reads registers, with a main loop that comes every `step` microseconds. */
+static uint8_t read_words(uint16_t address, uint16_t quantity, uint32_t step)
+{
+    return end_read(mbm_node_readHoldingRegisters(&node, address, quantity), step);
+}
+
 static void reads(uint16_t address, uint16_t quantity, uint32_t step)
 {
     memset(words, 0, sizeof words);
     OK(read_words(address, quantity, step));
     for (unsigned i = 0; i < quantity; i++)
         assert_int_equal(words[i], value(address + i));
-}
-
-static void is_quiet(void)
-{
-    assert_int_equal(m.collisions, 0);
-    assert_int_equal(m.undriven, 0);
-    assert_int_equal(m.isDriving, 0);
 }
 
 /* --- reception */
@@ -122,7 +127,7 @@ static void reads_at_every_position(uint8_t byDma)
             reads((uint16_t)round, quantity, 250 + 7 * round);
     assert_int_equal(mbm_stm32_lost(&uart), 0);
     assert_int_equal(uart.overruns + uart.faulty + uart.restarts + uart.stalled, 0);
-    is_quiet();
+    uart_is_quiet();
 }
 
 TEST(by_dma_a_master_reads_at_every_position_of_the_buffer)
@@ -158,19 +163,10 @@ static void late_main_loop_is_counted(uint8_t byDma)
     start(byDma);
     open_line();
     for (unsigned round = 0; round < 30; round++) {
-        uint8_t status;
-        unsigned sent = m.sentCount;
-
-        IS(MBM_PENDING, mbm_node_readHoldingRegisters(&node, 3, 125));
-        while (m.sentCount < sent + 8) {
-            machine_run(200);
-            mbm_node_poll(&node);
-        }
+        IS(MBM_PENDING, begin_read(3, 125, 8, 200));
         /* The main loop is away for the whole reply, 255 characters, and one more. */
         machine_run(40000 + 10 * round);
-        while ((status = mbm_node_poll(&node)) == MBM_PENDING)
-            machine_run(500);
-        assert_int_not_equal(status, MBM_OK);
+        assert_int_not_equal(end_read(mbm_node_poll(&node), 500), MBM_OK);
         lost = (uint16_t)(lost + 255 - 63);
         assert_int_equal(mbm_stm32_lost(&uart), lost);
         machine_run(300000);
@@ -213,7 +209,7 @@ static void errors_at_every_character(uint8_t byDma)
         seen = kinds[kind] & OVERRUN ? uart.overruns : uart.faulty;
         if (seen < 60)
             fail_msg("of 64 errors %u, %u were counted", kinds[kind], seen);
-        is_quiet();
+        uart_is_quiet();
     }
 }
 
@@ -227,7 +223,7 @@ TEST(by_interrupt_reception_goes_on_after_each_error_at_each_character)
     errors_at_every_character(0);
 }
 
-static void disturbed_character_before_a_reply_does_no_harm(uint8_t byDma)
+static void reply_before_disturbed_characters_is_read(uint8_t byDma)
 {
     static const unsigned kinds[] = {FRAMING, NOISE, PARITY};
 
@@ -235,24 +231,17 @@ static void disturbed_character_before_a_reply_does_no_harm(uint8_t byDma)
     open_line();
     pause = 500;
     for (unsigned round = 0; round < 96; round++) {
-        uint8_t status = mbm_node_readHoldingRegisters(&node, 5, 2);
-        unsigned sent = m.sentCount;
+        unsigned end = m.sentCount + 8;
 
-        while (m.sentCount < sent + 7) {
-            machine_run(50);
-            status = mbm_node_poll(&node);
-        }
-        while (m.sentCount < sent + 8)
+        IS(MBM_PENDING, begin_read(5, 2, 7, 50));
+        while (m.sentCount < end)
             machine_run(10);
-        /* As the device's driver goes on. Nobody reads until all of the reply is there. */
-        (void)status;
+        /* The reply arrives, and nobody reads it. Then the device's driver disturbs the line. */
         machine_run(2000 + round);
         for (unsigned glitches = round % 4; glitches > 0; glitches--)
             machine_receive_faulty(0, kinds[round % 3]);
         machine_run(1000);
-        while ((status = mbm_node_poll(&node)) == MBM_PENDING)
-            machine_run(50);
-        OK(status);
+        OK(end_read(mbm_node_poll(&node), 50));
         assert_int_equal(words[1], value(6));
         machine_run(1000);
     }
@@ -260,8 +249,8 @@ static void disturbed_character_before_a_reply_does_no_harm(uint8_t byDma)
 
 TEST(a_reply_is_not_lost_because_disturbed_characters_follow_it)
 {
-    disturbed_character_before_a_reply_does_no_harm(0);
-    disturbed_character_before_a_reply_does_no_harm(1);
+    reply_before_disturbed_characters_is_read(0);
+    reply_before_disturbed_characters_is_read(1);
 }
 
 static void reception_that_was_aborted_begins_again(uint8_t byDma)
@@ -269,19 +258,11 @@ static void reception_that_was_aborted_begins_again(uint8_t byDma)
     start(byDma);
     open_line();
     for (unsigned at = 1; at <= 9; at++) {
-        uint8_t status = mbm_node_readHoldingRegisters(&node, 5, 2);
-        unsigned sent = m.sentCount;
+        uint8_t status = begin_read(5, 2, 8, 50);
 
-        while (m.sentCount < sent + 8) {
-            machine_run(50);
-            status = mbm_node_poll(&node);
-        }
         machine_run(96 * at);
         chip_abort_reception();
-        while (status == MBM_PENDING) {
-            machine_run(50);
-            status = mbm_node_poll(&node);
-        }
+        status = end_read(status, 50);
         /* What had arrived before is not lost. */
         if (at == 9)
             OK(status);
@@ -350,7 +331,7 @@ static void quick_device(uint8_t byDma, uint32_t step)
         m.sentCount = answered = 0;
     }
     assert_int_equal(m.driverChanges, 200);
-    is_quiet();
+    uart_is_quiet();
 }
 
 TEST(a_device_that_replies_with_the_last_bit_is_received_100_of_100_times)
@@ -370,7 +351,7 @@ TEST(a_single_wire_receives_with_the_last_bit)
         open_line();
         for (unsigned round = 0; round < 100; round++)
             reads((uint16_t)round, 2, 5000);
-        is_quiet();
+        uart_is_quiet();
         assert_int_equal(m.driverChanges, 200);
     }
 }
@@ -387,7 +368,7 @@ TEST(a_frame_that_is_longer_than_the_send_buffer_keeps_the_driver_on)
     memset(&request, 0, sizeof request);
     start(1);
     m.device = NULL;
-    assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
+    uart_open();
     OK(mbm_client_beginAscii(&client, &port, ascii, sizeof ascii));
     OK(mbm_client_setBaudRate(&client, 115200));
     request.unit = 0;
@@ -402,86 +383,7 @@ TEST(a_frame_that_is_longer_than_the_send_buffer_keeps_the_driver_on)
     assert_int_equal(m.sentCount, 2 * (7 + 246 + 1) + 3);
     assert_int_equal(m.sent[m.sentCount - 1], '\n');
     assert_int_equal(m.driverChanges, changes + 2);
-    is_quiet();
-}
-
-static uint8_t server_frame[MBM_MAX_FRAME];
-
-TEST(a_server_answers_at_every_position_and_from_a_main_loop_that_is_late)
-{
-    static uint16_t cells[10];
-    static mbm_registerTable holding;
-    static mbm_unit unit;
-    static mbm_server server;
-
-    for (uint8_t byDma = 0; byDma < 2; byDma++) {
-        memset(&server, 0, sizeof server);
-        memset(&unit, 0, sizeof unit);
-        holding = (mbm_registerTable){.words = cells, .base = 100, .size = 10};
-        unit.id = UNIT;
-        start(byDma);
-        m.device = NULL;
-        assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
-        OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-        OK(mbm_server_beginRtu(&server, &port, &unit, 1, server_frame, sizeof server_frame));
-        OK(mbm_server_setBaudRate(&server, 115200));
-        for (unsigned round = 0; round < 200; round++) {
-            uint8_t request[8] = {UNIT, 6, 0, 105, (uint8_t)(round >> 8), (uint8_t)round};
-            unsigned sent = m.sentCount;
-
-            seal(request, 6);
-            machine_receive(request, 8, 0);
-            for (unsigned polls = 0; polls < 40 && m.sentCount < sent + 8; polls++) {
-                machine_run(round % 2 ? 100 : 3000);
-                mbm_server_poll(&server);
-            }
-            assert_int_equal(m.sentCount, sent + 8);
-            assert_memory_equal(m.sent + sent, request, 8);
-            assert_int_equal(cells[5], round);
-            machine_run(3000);
-            mbm_server_poll(&server);
-        }
-        is_quiet();
-        assert_int_equal(mbm_stm32_lost(&uart), 0);
-    }
-}
-
-TEST(a_server_answers_a_request_that_follows_disturbed_characters)
-{
-    static uint16_t cells[10];
-    static mbm_registerTable holding;
-    static mbm_unit unit;
-    static mbm_server server;
-    static const unsigned kinds[] = {FRAMING, NOISE, PARITY};
-
-    for (uint8_t byDma = 0; byDma < 2; byDma++) {
-        memset(&server, 0, sizeof server);
-        memset(&unit, 0, sizeof unit);
-        holding = (mbm_registerTable){.words = cells, .base = 100, .size = 10};
-        unit.id = UNIT;
-        start(byDma);
-        m.device = NULL;
-        assert_int_equal(mbm_stm32_open(&uart, &huart1, &port), MBM_STM32_OK);
-        OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-        OK(mbm_server_beginRtu(&server, &port, &unit, 1, server_frame, sizeof server_frame));
-        OK(mbm_server_setBaudRate(&server, 115200));
-        for (unsigned round = 0; round < 60; round++) {
-            uint8_t request[8] = {UNIT, 6, 0, 105, 0, (uint8_t)round};
-            unsigned sent = m.sentCount;
-
-            seal(request, 6);
-            /* As the master's driver goes on. */
-            machine_receive_faulty(0, kinds[round % 3]);
-            machine_receive(request, 8, 0);
-            for (unsigned polls = 0; polls < 20 && m.sentCount < sent + 8; polls++) {
-                machine_run(2500);
-                mbm_server_poll(&server);
-            }
-            assert_int_equal(m.sentCount, sent + 8);
-            machine_run(5000);
-            mbm_server_poll(&server);
-        }
-    }
+    uart_is_quiet();
 }
 
 /* --- faults of program and board: a status, and the next request works */
@@ -503,7 +405,7 @@ TEST(a_uart_that_is_not_started_is_a_status_and_then_works)
     assert_int_equal(port.read(&uart, nothing, sizeof nothing), 0);
     machine_run(10000);
     reads(5, 2, 500);
-    is_quiet();
+    uart_is_quiet();
 }
 
 TEST(a_transmission_that_does_not_end_is_a_status_and_then_works)
@@ -545,7 +447,7 @@ TEST(a_pin_that_keeps_nothing_is_a_status_and_then_works)
     assert_int_equal(m.sentCount, 0);
     m.hasNoPin = 0;
     reads(5, 2, 500);
-    is_quiet();
+    uart_is_quiet();
 }
 
 TEST(another_transmission_on_the_uart_is_a_status_and_then_works)
@@ -556,7 +458,7 @@ TEST(another_transmission_on_the_uart_is_a_status_and_then_works)
     IS(MBM_LINE_BUSY, read_words(5, 2, 500));
     huart1.gState = HAL_UART_STATE_READY;
     reads(5, 2, 500);
-    is_quiet();
+    uart_is_quiet();
 }
 
 TEST(a_device_that_is_mute_is_a_timeout_and_then_heard)

@@ -146,8 +146,8 @@ def serve_in_qemu(kit, image: pathlib.Path) -> None:
 
 
 def on_this_machine(kit) -> None:
-    """Runs c-tests/test_stm32.c over the source of the HAL, whose registers are played."""
-    name, root = "f4", kit.root
+    """Runs the tests c-tests/test_stm32*.c over the source of the HAL, whose registers are played."""
+    name, root, tests = "f4", kit.root, ("test_stm32", "test_stm32_server")
     hal, work, host = kit.there(kit.tree / f"stm32{name}xx_hal_driver"), kit.work / "host", root / "firmware-tests/kits/stm32/host"
     work.mkdir()
     template = kit.there(hal / f"Inc/stm32{name}xx_hal_conf_template.h")
@@ -163,15 +163,18 @@ def on_this_machine(kit) -> None:
                (host / f"chip_{name}.c", ["-Wall", "-Wextra", "-Werror", *with_hal]), (host / "registers.c", ["-O1"]),
                (root / "c-tests/stm32/machine.c", ["-O1"]), (root / "c-tests/support/test.c", ["-O1"]),
                *((root / source, ["-O1", "-Wall", "-Wextra", "-Werror", *with_hal]) for source in
-                 ("c-tests/test_stm32.c", "ports/stm32/mbm_stm32.c", "ports/stm32/mbm_stm32_callbacks.c"))]
-    objects = []
+                 (*(f"c-tests/{test}.c" for test in tests), "c-tests/stm32/uart.c", "ports/stm32/mbm_stm32.c",
+                  "ports/stm32/mbm_stm32_callbacks.c"))]
     for source, options in sources:
-        objects.append(work / (source.stem + ".o"))
-        kit.run(kit.log, [*low, *options, "-c", source, "-o", objects[-1]])
-    program = work / "test_stm32"
-    kit.run(kit.log, [*low, *objects, kit.there(root / "target/release/libmbm.a"), "-lcmocka", "-lpthread", "-o", program])
-    said = kit.run(kit.log, [program])
-    passed = re.search(r"PASSED\s+\] (\d+) test", said) or re.search(r"^1\.\.(\d+)$", said, re.M)
-    if not passed or "FAILED" in said or "not ok" in said:
-        sys.exit(f"real: the tests over the HAL's source print:\n{said[-3000:]}")
-    print(f"real: stm32 host: {passed[1]} tests of the port over the source of the HAL, by DMA and by interrupt")
+        kit.run(kit.log, [*low, *options, "-c", source, "-o", work / (source.stem + ".o")])
+    shared = [work / (source.stem + ".o") for source, _ in sources if source.stem not in tests]
+    count = 0
+    for test in tests:
+        kit.run(kit.log, [*low, work / (test + ".o"), *shared, kit.there(root / "target/release/libmbm.a"), "-lcmocka", "-lpthread",
+                          "-o", work / test])
+        said = kit.run(kit.log, [work / test])
+        passed = re.search(r"PASSED\s+\] (\d+) test", said) or re.search(r"^1\.\.(\d+)$", said, re.M)
+        if not passed or "FAILED" in said or "not ok" in said:
+            sys.exit(f"real: the tests over the HAL's source print:\n{said[-3000:]}")
+        count += int(passed[1])
+    print(f"real: stm32 host: {count} tests of the port over the source of the HAL, by DMA and by interrupt")
