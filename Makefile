@@ -28,9 +28,9 @@ TESTS := $(patsubst c-tests/%.c,%,$(wildcard c-tests/test_*.c)) \
 TLS_TESTS := $(filter test_tls%,$(TESTS))
 # The test kit for ports, and its own tests.
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
-FREERTOS_TESTS := $(filter test_freertos%,$(TESTS))
+FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
-PORT_TESTS := $(filter test_porttest%,$(TESTS)) $(FREERTOS_TESTS)
+PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
@@ -291,7 +291,8 @@ $(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
-$(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c))
+$(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
+$(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/freertos
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): $(DEVICE_FILES:%.c=$(BUILD)/$(1)/%.o) \
 	$(patsubst %,$(BUILD)/$(1)/cli/%.o,home names place yaml_file conversion decimal value value_dates value_types numbers report)
 $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over clock)

@@ -1,129 +1,18 @@
 /* The ports of ports/freertos, over the few calls of FreeRTOS that c-tests/shim plays: tasks are
- * threads. A UART is one end of a pty, with a thread as its interrupt. `make check-real
- * KIT=freertos` runs them with the real kernel. */
-#define _GNU_SOURCE
+ * threads. `make check-real KIT=freertos` runs the ports with the real kernel. */
 #include "freertos.h"
-#include "mbm_freertos_uart.h"
-#include "mbm_porttest.h"
 #include "await.h"
 #include "mbm_tty.h"
-#include "must.h"
-#include "pty.h"
 #include "server.h"
+#include "uart.h"
 
-#include <poll.h>
-#include <pthread.h>
+enum { UNIT = 17, LONG = 20000 /* ms */, SHORT = 40 /* ms */ };
 
-enum { UNIT = 17, BAUD = 115200, RING = 64, LONG = 20000 /* ms */, SHORT = 40 /* ms */ };
-
-/* The UART: its registers are flags, its interrupt a thread. */
-static struct {
-    int fd;
-    int to_do[2]; /* a byte for each call of startSending, and 'q' for the end */
-    volatile int is_started;
-    volatile int driver, driver_was_on, driver_in_interrupt;
-    pthread_t thread;
-} chip;
-
-static mbm_freertosUart uart;
-static mbm_port port;
 static mbm_line line;
 static mbm_node node;
 static uint16_t words[10];
-static uint8_t frame[MBM_MAX_FRAME], received[RING], to_send[MBM_MAX_FRAME];
+static uint8_t frame[MBM_MAX_FRAME];
 static server peer;
-
-static void start_sending(void *context)
-{
-    if (chip.is_started)
-        must(write(chip.to_do[1], "s", 1) == 1, "start_sending");
-}
-
-static void set_driver(void *context, uint8_t on)
-{
-    chip.driver = on;
-    chip.driver_was_on |= on;
-    if (!on && pthread_equal(pthread_self(), chip.thread))
-        chip.driver_in_interrupt++;
-}
-
-static void send_interrupt(void)
-{
-    BaseType_t woken = pdFALSE;
-    uint8_t byte;
-
-    for (;;) {
-        int more;
-
-        freertos_enter();
-        more = mbm_freertos_nextFromISR(&uart, &byte);
-        if (!more)
-            mbm_freertos_sentFromISR(&uart, &woken);
-        freertos_exit();
-        if (!more)
-            return;
-        must(write(chip.fd, &byte, 1) == 1, "send");
-    }
-}
-
-static void receive_interrupt(void)
-{
-    BaseType_t woken = pdFALSE;
-    uint8_t bytes[16];
-    const ssize_t count = read(chip.fd, bytes, sizeof bytes);
-
-    must(count > 0, "receive");
-    freertos_enter();
-    mbm_freertos_receivedFromISR(&uart, bytes, (uint16_t)count, &woken);
-    freertos_exit();
-}
-
-static void *interrupts(void *context)
-{
-    for (;;) {
-        struct pollfd waits[2] = {{chip.to_do[0], POLLIN, 0}, {chip.fd, POLLIN, 0}};
-        char what;
-
-        poll(waits, 2, -1);
-        if (waits[0].revents) {
-            must(read(chip.to_do[0], &what, 1) == 1, "interrupts");
-            if (what == 'q')
-                return NULL;
-            send_interrupt();
-        }
-        if (waits[1].revents & POLLIN)
-            receive_interrupt();
-    }
-}
-
-static void chip_start(int fd)
-{
-    memset(&chip, 0, sizeof chip);
-    chip.fd = fd;
-    chip.is_started = 1;
-    must(pipe(chip.to_do) == 0, "pipe");
-    must(pthread_create(&chip.thread, NULL, interrupts, NULL) == 0, "pthread_create");
-}
-
-static void chip_stop(void)
-{
-    must(write(chip.to_do[1], "q", 1) == 1, "chip_stop");
-    pthread_join(chip.thread, NULL);
-    close(chip.to_do[0]);
-    close(chip.to_do[1]);
-}
-
-static void settings(void)
-{
-    memset(&uart, 0, sizeof uart);
-    uart.startSending = start_sending;
-    uart.setDriver = set_driver;
-    uart.baud = BAUD;
-    uart.received = received;
-    uart.receivedBytes = sizeof received;
-    uart.toSend = to_send;
-    uart.toSendBytes = sizeof to_send;
-}
 
 static void master_begin(mbm_node *n, uint8_t unit, uint16_t *response, uint16_t timeout)
 {
@@ -136,34 +25,29 @@ static void master_begin(mbm_node *n, uint8_t unit, uint16_t *response, uint16_t
 static void setup(void)
 {
     server_start(&peer, UNIT);
-    settings();
+    uart_settings();
     OK(mbm_freertos_open(&uart, &port));
-    chip_start(peer.line.ours);
+    uart_start(peer.line.ours);
     memset(&line, 0, sizeof line);
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
-    OK(mbm_line_setBaudRate(&line, BAUD));
+    OK(mbm_line_setBaudRate(&line, UART_BAUD));
     master_begin(&node, UNIT, words, LONG);
     freertos_sleeps = freertos_yields = freertos_given = 0;
 }
 
 static void teardown(void)
 {
-    chip_stop();
+    uart_stop();
     server_stop(&peer);
 }
 
 fixture each_test = {setup, teardown};
 
-static void reads_right(mbm_node *n, const uint16_t *response, uint16_t address)
-{
-    OK(mbm_node_readHoldingRegisters(n, address, 10));
-    for (unsigned i = 0; i < 10; i++)
-        assert_int_equal(response[i], server_pattern(address + i));
-}
-
 static void is_right(void)
 {
-    reads_right(&node, words, 20);
+    OK(mbm_node_readHoldingRegisters(&node, 20, 10));
+    for (unsigned i = 0; i < 10; i++)
+        assert_int_equal(words[i], server_pattern(20 + i));
 }
 
 TEST(a_blocking_call_sleeps_until_bytes_come_and_does_not_poll)
@@ -289,7 +173,7 @@ TEST(a_uart_that_is_not_started_is_a_busy_line_and_the_next_request_is_right_onc
     }
     /* Its interrupt, which was pending, finds nothing to send. */
     chip.is_started = 1;
-    start_sending(NULL);
+    uart.startSending(NULL);
     /* The reply is held for a response timeout, because others may be late. */
     OK(mbm_node_setResponseTimeout(&node, 500));
     AWAIT(mbm_node_readHoldingRegisters(&node, 20, 10) == MBM_OK);
@@ -322,7 +206,7 @@ TEST(a_line_that_is_closed_wakes_its_task_with_a_lost_link_and_opens_again)
 
 TEST(bytes_that_find_no_place_and_overruns_of_the_uart_are_counted_and_the_next_request_is_right)
 {
-    uint8_t noise[RING + 5] = {0};
+    uint8_t noise[UART_RING + 5] = {0};
     BaseType_t woken;
 
     mbm_freertos_receivedFromISR(&uart, noise, sizeof noise, &woken);
@@ -374,200 +258,12 @@ TEST(the_driver_goes_off_when_the_line_is_closed)
     assert_int_equal(chip.driver, 0);
 }
 
-/* --- a task that serves */
-
-enum { SLOW = 0x41 };
-static pty served;
-static modbus_t *client;
-static mbm_server responder;
-static mbm_unit unit;
-static mbm_registerTable holding;
-static mbm_custom slow;
-static volatile uint16_t slow_reply;
-static volatile unsigned polls;
-static volatile int is_over;
-static pthread_t serving;
-
-static uint16_t serve_slowly(void *context, const mbm_request *request, uint8_t *response,
-                             uint16_t capacity)
-{
-    return slow_reply;
-}
-
-static void *serve(void *context)
-{
-    while (!is_over) {
-        (void)mbm_server_poll(&responder);
-        polls++;
-        mbm_freertos_wait(&uart.line, mbm_server_pollDelay(&responder));
-    }
-    return NULL;
-}
-
-static void serve_setup(void)
-{
-    pty_open(&served);
-    settings();
-    OK(mbm_freertos_open(&uart, &port));
-    chip_start(served.ours);
-    memset(&responder, 0, sizeof responder);
-    unit = (mbm_unit){.id = UNIT};
-    holding = (mbm_registerTable){.words = words, .base = 100, .size = 10};
-    slow = (mbm_custom){.code = SLOW, .serve = serve_slowly};
-    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-    OK(mbm_unit_serveCustom(&unit, &slow));
-    OK(mbm_server_beginRtu(&responder, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_setBaudRate(&responder, BAUD));
-    client = modbus_new_rtu(served.path, BAUD, 'N', 8, 1);
-    assert_int_equal(modbus_set_slave(client, UNIT), 0);
-    assert_int_equal(modbus_connect(client), 0);
-    modbus_set_response_timeout(client, LONG / 1000, 0);
-    is_over = 0;
-    polls = 0;
-    freertos_sleeps = freertos_yields = freertos_given = 0;
-    assert_int_equal(pthread_create(&serving, NULL, serve, NULL), 0);
-}
-
-static void serve_teardown(void)
-{
-    is_over = 1;
-    mbm_freertos_wake(&uart.line);
-    pthread_join(serving, NULL);
-    modbus_close(client);
-    modbus_free(client);
-    chip_stop();
-    pty_close(&served);
-}
-
-static void serves_right(uint16_t value)
-{
-    uint16_t read[10] = {0};
-
-    assert_int_equal(modbus_write_register(client, 105, value), 1);
-    assert_int_equal(modbus_read_registers(client, 100, 10, read), 10);
-    assert_int_equal(read[5], value);
-}
-
-TEST_WITH(a_server_task_sleeps_until_bytes_come, serve_setup, serve_teardown)
-{
-    AWAIT(uart.line.waiting != NULL);
-    for (uint16_t i = 1; i <= 20; i++)
-        serves_right(i);
-    /* 40 requests of 8 bytes; for each the silence, the frame that leaves, and its echo. */
-    assert_in_range(freertos_sleeps, 20, 40 * 16);
-    assert_in_range(polls, 20, 40 * 24);
-}
-
-TEST_WITH(a_server_with_a_pending_function_sleeps_although_bytes_wait, serve_setup, serve_teardown)
-{
-    uint8_t request[] = {UNIT, SLOW}, noise[40] = {0};
-    unsigned polled, slept;
-
-    slow_reply = MBM_REPLY_PENDING;
-    assert_true(modbus_send_raw_request(client, request, sizeof request) > 0);
-    AWAIT(polls > 0 && mbm_server_pollDelay(&responder) == 1000);
-    must(write(served.theirs, noise, sizeof noise) == sizeof noise, "noise");
-    AWAIT(mbm_ring_available(&uart.ring) == sizeof noise);
-    polled = polls;
-    slept = freertos_sleeps;
-    AWAIT(polls > polled + 50);
-    assert_true(freertos_sleeps - slept >= polls - polled - 10);
-    slow_reply = 0;
-    /* The noise came after the request, which therefore gets no answer; and a request that follows
-     * it without a silence is lost with it. */
-    modbus_set_response_timeout(client, 0, 1000 * SHORT);
-    AWAIT(modbus_write_register(client, 105, 6) == 1);
-    modbus_set_response_timeout(client, LONG / 1000, 0);
-    serves_right(7);
-}
-
-TEST_WITH(a_server_whose_uart_stops_answers_again_once_it_works, serve_setup, serve_teardown)
-{
-    uint16_t read;
-
-    serves_right(1);
-    chip.is_started = 0;
-    modbus_set_response_timeout(client, 0, 1000 * SHORT);
-    assert_int_equal(modbus_read_registers(client, 100, 1, &read), -1);
-    AWAIT(mbm_freertos_stalled(&uart) == 1);
-    chip.is_started = 1;
-    modbus_set_response_timeout(client, LONG / 1000, 0);
-    serves_right(2);
-    assert_int_equal(mbm_freertos_stalled(&uart), 1);
-}
-
-/* --- the test kit for ports */
-
-static void hear(void *context, mbm_portFinding kind, const char *sentence)
-{
-    if (kind == MBM_PORT_WRONG)
-        print_error("%s\n", sentence);
-}
-
-static uint32_t lost(void *context)
-{
-    return mbm_freertos_lost(&uart);
-}
-
-static uint8_t driver(void *context)
-{
-    return (uint8_t)chip.driver;
-}
-
-static uint8_t begin(void *context)
-{
-    mbm_freertos_close(&uart);
-    return mbm_freertos_open(&uart, &port);
-}
-
-static void yield(void *context)
-{
-    poll(NULL, 0, 1);
-}
-
-static void kit_setup(void)
-{
-    static uint8_t whole_frame[MBM_MAX_FRAME + 1];
-
-    pty_open(&served);
-    settings();
-    uart.received = whole_frame;
-    uart.receivedBytes = sizeof whole_frame;
-    OK(mbm_freertos_open(&uart, &port));
-    chip_start(served.ours);
-}
-
-static void kit_teardown(void)
-{
-    chip_stop();
-    pty_close(&served);
-}
-
-TEST_WITH(the_port_passes_the_test_kit, kit_setup, kit_teardown)
-{
-    static mbm_portTest test;
-    static mbm_tty far;
-    mbm_port other;
-
-    OK(mbm_tty_attach(&far, served.theirs));
-    other = mbm_tty_port(&far);
-    test = (mbm_portTest){.port = &port,
-                          .other = &other,
-                          .holds = MBM_MAX_FRAME,
-                          .say = hear,
-                          .lost = lost,
-                          .driver = driver,
-                          .begin = begin,
-                          .yield = yield};
-    assert_int_equal(mbm_portTest_run(&test), 0);
-    assert_in_range(test.checks, 10, 100);
-}
-
 /* --- a port of another kind */
 
 static mbm_freertosPort over;
 static mbm_tty tty;
-static volatile int is_full, is_lost;
+static volatile int is_full, is_lost, is_over;
+static pthread_t waking;
 
 static int16_t tty_write(void *context, const uint8_t *bytes, uint16_t length)
 {
@@ -599,17 +295,17 @@ static void wrapped_setup(void)
     over.link.micros = NULL;
     OK(mbm_freertos_wrap(&over, &port));
     OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
-    OK(mbm_line_setBaudRate(&line, BAUD));
+    OK(mbm_line_setBaudRate(&line, UART_BAUD));
     master_begin(&node, UNIT, words, LONG);
     is_full = is_lost = is_over = 0;
     freertos_sleeps = freertos_yields = freertos_given = 0;
-    assert_int_equal(pthread_create(&serving, NULL, wake, NULL), 0);
+    assert_int_equal(pthread_create(&waking, NULL, wake, NULL), 0);
 }
 
 static void wrapped_teardown(void)
 {
     is_over = 1;
-    pthread_join(serving, NULL);
+    pthread_join(waking, NULL);
     server_stop(&peer);
 }
 
@@ -658,23 +354,23 @@ TEST(a_port_without_read_or_write_is_not_wrapped)
 TEST(settings_without_a_part_are_refused)
 {
     IS(MBM_BUSY, mbm_freertos_open(&uart, &port));
-    settings();
+    uart_settings();
     IS(MBM_NOT_INITIALISED, mbm_freertos_take(&uart.line, 0));
     mbm_freertos_give(&uart.line);
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(NULL, &port));
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, NULL));
     uart.baud = 0;
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, &port));
-    settings();
+    uart_settings();
     uart.startSending = NULL;
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, &port));
-    settings();
+    uart_settings();
     uart.toSendBytes = 0;
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, &port));
-    settings();
+    uart_settings();
     uart.receivedBytes = 1;
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, &port));
-    settings();
+    uart_settings();
     uart.received = NULL;
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_open(&uart, &port));
     IS(MBM_INVALID_ARGUMENT, mbm_freertos_take(NULL, 0));
@@ -684,7 +380,7 @@ TEST(settings_without_a_part_are_refused)
     mbm_freertos_wakeFromISR(NULL, NULL);
     mbm_freertos_close(NULL);
     assert_int_equal(mbm_freertos_lost(NULL) + mbm_freertos_stalled(NULL), 0);
-    assert_int_equal(mbm_freertos_nextFromISR(NULL, to_send), 0);
+    assert_int_equal(mbm_freertos_nextFromISR(NULL, frame), 0);
 }
 
 /* --- the clock */
