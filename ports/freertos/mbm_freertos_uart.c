@@ -14,6 +14,12 @@ static TickType_t longest(const mbm_freertosUart *uart)
     return (TickType_t)(uart->end * (2u * BITS) * (uint32_t)configTICK_RATE_HZ / uart->baud + 2u);
 }
 
+static void switch_driver(const mbm_freertosUart *uart, uint8_t on)
+{
+    if (uart->setDriver != NULL)
+        uart->setDriver(uart->context, on);
+}
+
 /* --- the interrupt */
 
 void mbm_freertos_receivedFromISR(mbm_freertosUart *uart, const uint8_t *bytes, uint16_t length,
@@ -38,8 +44,8 @@ void mbm_freertos_sentFromISR(mbm_freertosUart *uart, BaseType_t *woken)
 {
     if (uart == NULL || !uart->isSending || uart->next < uart->end)
         return;
-    if (uart->setDriver != NULL && !uart->hasNoSentInterrupt)
-        uart->setDriver(uart->context, 0);
+    if (!uart->hasNoSentInterrupt)
+        switch_driver(uart, 0);
     uart->isSending = 0;
     mbm_freertos_wakeFromISR(&uart->line, woken);
 }
@@ -132,8 +138,7 @@ static void driver_on(void *context)
     mbm_freertosUart *uart = context;
 
     uart->line.isTransmitting = 1;
-    if (uart->setDriver != NULL)
-        uart->setDriver(uart->context, 1);
+    switch_driver(uart, 1);
 }
 
 static void driver_off(void *context)
@@ -143,8 +148,7 @@ static void driver_off(void *context)
     uart->line.isTransmitting = 0;
     if (uart->isSending)
         stall(uart);
-    if (uart->setDriver != NULL)
-        uart->setDriver(uart->context, 0);
+    switch_driver(uart, 0);
 }
 
 /* --- opening */
@@ -172,8 +176,7 @@ uint8_t mbm_freertos_open(mbm_freertosUart *uart, mbm_port *port)
     uart->isSending = 0;
     uart->overruns = 0;
     uart->stalled = 0;
-    if (uart->setDriver != NULL)
-        uart->setDriver(uart->context, 0);
+    switch_driver(uart, 0);
     *port = hooks;
     port->context = uart;
     uart->isOpen = 1;
@@ -186,8 +189,7 @@ void mbm_freertos_close(mbm_freertosUart *uart)
         return;
     uart->isOpen = 0;
     give_up(uart);
-    if (uart->setDriver != NULL)
-        uart->setDriver(uart->context, 0);
+    switch_driver(uart, 0);
     mbm_freertos_wake(&uart->line);
 }
 
