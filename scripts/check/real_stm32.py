@@ -8,7 +8,6 @@ form runs on this machine, over the HAL's source and registers that are played: 
 import pathlib
 import re
 import subprocess
-import sys
 import time
 
 # The chip of each family: the symbol of its header, the start-up file, the options of the compiler, the archive, and flash and RAM.
@@ -138,7 +137,7 @@ def serve_in_qemu(kit, image: pathlib.Path) -> None:
             for _ in range(20):
                 said = kit.run(kit.log, [*mbm, *command])
                 if not all(re.search(rf"\b{word}\b", said) for word in expected):
-                    sys.exit(f"real: {command} prints {said}")
+                    kit.fail(f"{command} prints {said}")
     finally:
         qemu.kill()
         qemu.wait(10)
@@ -175,6 +174,6 @@ def on_this_machine(kit) -> None:
         said = kit.run(kit.log, [work / test])
         passed = re.search(r"PASSED\s+\] (\d+) test", said) or re.search(r"^1\.\.(\d+)$", said, re.M)
         if not passed or "FAILED" in said or "not ok" in said:
-            sys.exit(f"real: the tests over the HAL's source print:\n{said[-3000:]}")
+            kit.fail(f"the tests over the HAL's source print:\n{said[-3000:]}")
         count += int(passed[1])
     print(f"real: stm32 host: {count} tests of the port over the source of the HAL, by DMA and by interrupt")
