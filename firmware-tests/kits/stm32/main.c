@@ -125,8 +125,9 @@ void HAL_UART_MspInit(UART_HandleTypeDef *huart)
 }
 
 #ifdef MEASURE
-/* With -icount QEMU takes a fixed time for an instruction. The handler of the transmitter, which is
- * SysTick's here, is not counted. The stack was painted before. */
+/* -DMEASURE is for the figures of docs/guide-stm32.md. With -icount QEMU takes a fixed time for an
+ * instruction. The handler of the transmitter, which is SysTick's here, is not counted. The stack
+ * was painted before. */
 static uint32_t spent, calls;
 extern uint32_t _ebss, _estack;
 
