@@ -3,11 +3,9 @@
 
 mod common;
 
-use common::uart::{Bench, Wire};
+use common::uart::{master, read, write, Bench, Wire};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
-use mbm::engine::Buffers;
 use mbm::error::{Error, Status};
-use mbm::master::Master;
 use mbm::port::{EmbeddedIo, Port};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -80,23 +78,6 @@ fn stream(bench: &Bench) -> impl Port + use<> {
     EmbeddedIo::stream(uart, clock(wire)).with_driver(driver(wire), 115_200)
 }
 
-type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
-
-fn master<P: Port>(port: P) -> Master<P, Words> {
-    let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
-    let mut master = Master::new(17, port, buffers);
-    master.settings().set_baud_rate(115_200);
-    master
-}
-
-/// Reads three registers.
-fn read(bench: &mut Bench, port: impl Port) -> Result<Vec<u16>, Error> {
-    let mut master = master(port);
-    master.start_read_holding_registers(102, 3)?;
-    master.wait(|| bench.pass())?;
-    Ok(master.response().to_vec())
-}
-
 #[test]
 fn a_master_reads_registers_through_a_uart() {
     let mut bench = Bench::new();
@@ -110,23 +91,9 @@ fn the_driver_is_on_until_the_last_byte_has_left_and_off_before_the_reply() {
     for accepts in [1, 3, 256] {
         let mut bench = Bench::new();
         bench.wire.borrow_mut().accepts = accepts;
-        let mut master = master(serial(&bench));
-        let words = [7; 10];
-        assert_eq!(master.start_write_multiple_registers(100, &words), Ok(()));
-        let mut times = [0; 2];
-        let result = master.wait(|| {
-            let wire = bench.wire.borrow();
-            if !wire.is_flushed() {
-                times[0] = wire.now;
-            } else if wire.driver {
-                times[1] = wire.now;
-            }
-            drop(wire);
-            bench.pass();
-        });
-        assert_eq!(result, Ok(()), "{accepts}");
+        let port = serial(&bench);
+        let after = write(&mut bench, port);
         assert!(!bench.wire.borrow().is_cut_off, "{accepts}");
-        let after = times[1] - times[0];
         assert!((50..=250).contains(&after), "{accepts}: {after}");
     }
 }

@@ -3,10 +3,8 @@
 
 mod common;
 
-use common::uart::{Bench, Wire};
+use common::uart::{master, read, write, Bench, Wire};
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
-use mbm::engine::Buffers;
-use mbm::master::Master;
 use mbm::port::{PolledIo, Port};
 use mbm::Error;
 use std::cell::RefCell;
@@ -115,23 +113,6 @@ fn stream(uart: Uart) -> PolledIo<Uart, impl FnMut() -> u32, impl FnMut(bool)> {
     PolledIo::stream(uart, clock).with_driver(driver, 115_200)
 }
 
-type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
-
-fn master<P: Port>(port: P) -> Master<P, Words> {
-    let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
-    let mut master = Master::new(17, port, buffers);
-    master.settings().set_baud_rate(115_200);
-    master
-}
-
-/// Reads three registers.
-fn read(bench: &mut Bench, port: impl Port) -> Result<Vec<u16>, Error> {
-    let mut master = master(port);
-    master.start_read_holding_registers(102, 3)?;
-    master.wait(|| bench.pass())?;
-    Ok(master.response().to_vec())
-}
-
 /// Counts how often it is woken.
 #[derive(Default)]
 struct Woken(AtomicUsize);
@@ -195,23 +176,8 @@ fn the_driver_is_on_until_the_last_byte_has_left_even_if_a_flush_ends_early() {
             flushes_early,
             ..Uart::of(&bench)
         };
-        let mut master = master(serial(uart));
-        let words = [7; 10];
-        assert_eq!(master.start_write_multiple_registers(100, &words), Ok(()));
-        let mut times = [0; 2];
-        let result = master.wait(|| {
-            let wire = bench.wire.borrow();
-            if !wire.is_flushed() {
-                times[0] = wire.now;
-            } else if wire.driver {
-                times[1] = wire.now;
-            }
-            drop(wire);
-            bench.pass();
-        });
-        assert_eq!(result, Ok(()), "{accepts}");
+        let after = write(&mut bench, serial(uart));
         assert!(!bench.wire.borrow().is_cut_off, "{accepts}");
-        let after = times[1] - times[0];
         assert!((50..=250).contains(&after), "{accepts}: {after}");
     }
 }

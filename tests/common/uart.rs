@@ -1,9 +1,12 @@
 //! A UART of a master, with a device at the other end of its line. The line has its own clock.
 
 use super::device::Device;
+use mbm::engine::Buffers;
 use mbm::frame::Framing;
+use mbm::master::Master;
 use mbm::port::Port;
 use mbm::server::Server;
+use mbm::Error;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -153,4 +156,44 @@ impl Bench {
             .with_unit(|unit| server.serve(now, &mut [unit][..]));
         assert_eq!(served, Ok(()));
     }
+}
+
+type Words = Buffers<[u8; 256], [u16; 125], [u16; 123]>;
+
+/// A master of unit 17 at 115200 baud.
+pub fn master<P: Port>(port: P) -> Master<P, Words> {
+    let buffers = Buffers::new([0; 256], [0; 125], [0; 123]);
+    let mut master = Master::new(17, port, buffers);
+    master.settings().set_baud_rate(115_200);
+    master
+}
+
+/// Reads three registers.
+pub fn read(bench: &mut Bench, port: impl Port) -> Result<Vec<u16>, Error> {
+    let mut master = master(port);
+    master.start_read_holding_registers(102, 3)?;
+    master.wait(|| bench.pass())?;
+    Ok(master.response().to_vec())
+}
+
+/// Writes ten registers. Returns for how many microseconds the driver stays on after the last byte of
+/// the request has left.
+pub fn write(bench: &mut Bench, port: impl Port) -> u32 {
+    let mut master = master(port);
+    let words = [7; 10];
+    assert_eq!(master.start_write_multiple_registers(100, &words), Ok(()));
+    let mut times = [0; 2];
+    let result = master.wait(|| {
+        let wire = bench.wire.borrow();
+        if !wire.is_flushed() {
+            times[0] = wire.now;
+        } else if wire.driver {
+            times[1] = wire.now;
+        }
+        drop(wire);
+        bench.pass();
+    });
+    let accepts = bench.wire.borrow().accepts;
+    assert_eq!(result, Ok(()), "{accepts}");
+    times[1] - times[0]
 }
