@@ -107,7 +107,7 @@ async fn a_client_of_another_unit_gets_no_answer() {
     assert_eq!(read.unwrap(), Ok(vec![555]));
 }
 
-/// Lets other tasks run so many times.
+/// Yields to the other tasks of the executor `times` times.
 async fn yield_times(times: u32) {
     for _ in 0..times {
         yield_now().await;

@@ -34,7 +34,8 @@ type Count = Signal<CriticalSectionRawMutex, Result<u16, Error>>;
 static READ: Count = Count::new();
 static WRITTEN: Count = Count::new();
 
-/// Reads two registers that nobody writes. Returns how many reads had the values of the first one.
+/// Reads two registers again and again. No task writes them. Returns how many reads had the values of the
+/// first read.
 async fn read() -> Result<u16, Error> {
     let first: [u16; 2] = LINE.lock().await.holding_registers(20).await?;
     let mut same = 0;
@@ -46,7 +47,8 @@ async fn read() -> Result<u16, Error> {
     Ok(same)
 }
 
-/// Writes two registers, and reads them in a request of its own. Returns how many had the values.
+/// Writes two registers again and again, and reads them in another request. Returns how many reads had the
+/// values that were written.
 async fn write() -> Result<u16, Error> {
     let mut same = 0;
     for round in 0..ROUNDS {
