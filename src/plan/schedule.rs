@@ -169,7 +169,8 @@ impl Schedule {
     }
 
     /// Notes that the read that [`Schedule::next`] returned is queued; [`Schedule::end`] says that
-    /// it has ended.
+    /// it has ended. Call this only after `next` has returned one: the order of the reads is made there,
+    /// and without it `end` may never return.
     pub fn begin(&self, reads: &[Read]) {
         if let Some(read) = reads.get(usize::from(self.root.get())) {
             self.root
