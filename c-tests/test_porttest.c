@@ -185,7 +185,7 @@ TEST_ROW(
     a_read_past_its_capacity,
     finds(
         READ_OVERFLOWS,
-        "`read` wrote past `capacity`, which was 1: copy at most so many bytes, and keep the others for the next call."))
+        "`read` wrote past `capacity`, which was 1: copy at most `capacity` bytes; keep the rest for the next call."))
 TEST_ROW(
     a_write_that_waits,
     finds(

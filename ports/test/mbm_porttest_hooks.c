@@ -2,12 +2,11 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
-/* A clock that does not change while it is read so many times stands still: even a tick of 10 ms
- * is over by then on a fast processor. */
+/* A clock that returns the same time in this number of reads stands still. Even on a fast
+ * processor the reads last longer than a tick of 10 ms. */
 #define MOST_READS 4000000u
 
-/* A time that is too long is measured so often, since other work of a computer makes many too long.
- */
+/* How often a time that is too long is measured: other work of a computer makes many too long. */
 enum { TRIES = 64 };
 
 /* --- the clock */

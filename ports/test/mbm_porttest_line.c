@@ -82,7 +82,7 @@ static int16_t take(mbm_portTest *test, const mbm_port *port, uint8_t *space, ui
     test->isOver = 1;
     SAY_NUMBERS(
         test, MBM_PORT_WRONG,
-        "`read` wrote past `capacity`, which was %: copy at most so many bytes, and keep the others for the "
+        "`read` wrote past `capacity`, which was %: copy at most `capacity` bytes; keep the rest for the "
         "next call.",
         capacity);
     return -1;

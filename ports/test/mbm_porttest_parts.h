@@ -68,7 +68,7 @@ uint32_t mbm_portTest_now(const mbm_portTest *test);
 
 uint32_t mbm_portTest_since(const mbm_portTest *test, uint32_t then);
 
-/* Microseconds of so many characters; 0 without a baud rate. */
+/* How many microseconds `count` characters last; 0 without a baud rate. */
 uint32_t mbm_portTest_characters(const mbm_portTest *test, uint16_t count);
 
 /* Whether what a port sends can be received. */
