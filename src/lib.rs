@@ -298,6 +298,39 @@ pub mod engine;
 #[doc = include_str!("../README.md")]
 struct Guide;
 
+/// The example of a call of a client or master, after the lines that make it: what is before the call, the
+/// call, what is after it. The documentation shows these three alone.
+macro_rules! call_example {
+    ([] $made:literal, $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# fn main() -> Result<(), mbm::Error> {\n",
+            $made,
+            $before,
+            "\n",
+            $call,
+            "?;\n",
+            $after,
+            "\n# Ok(())\n# }\n```"
+        )
+    };
+    ([async] $made:literal, $before:literal, $call:literal, $after:literal) => {
+        concat!(
+            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
+            "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));\n",
+            "# async fn example() -> Result<(), mbm::Error> {\n",
+            $made,
+            $before,
+            "\n",
+            $call,
+            ".await?;\n",
+            $after,
+            "\n# Ok(())\n# }\n",
+            "# fn main() { assert_eq!(block_on(example()), Ok(())); }\n```"
+        )
+    };
+}
+
 pub mod client;
 pub mod gateway;
 pub mod master;

@@ -1,25 +1,13 @@
 //! The functions of a client whose calls wait for their end: each one of the standard, and those of
 //! the user. A client that blocks and one whose functions are futures have the same.
 
-/// The example of a call: what is before it, the call, what is after it. The documentation hides the rest.
+/// The example of a call: what is before it, the call, what is after it.
 macro_rules! example {
-    ([] $before:literal, $call:literal, $after:literal) => {
-        concat!(
-            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
-            "# fn main() -> Result<(), mbm::Error> {\n",
-            "# let mut client = mbm::client::BlockingClient::tcp(tcp());\n# macro_rules! pump { () => { client.port().units.device } }\n",
-            $before, "\n", $call, "?;\n", $after, "\n# Ok(())\n# }\n```"
-        )
+    ([] $($shown:literal),*) => {
+        call_example!([] "# let mut client = mbm::client::BlockingClient::tcp(tcp());\n# macro_rules! pump { () => { client.port().units.device } }\n", $($shown),*)
     };
-    ([async] $before:literal, $call:literal, $after:literal) => {
-        concat!(
-            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
-            "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));\n",
-            "# async fn example() -> Result<(), mbm::Error> {\n",
-            "# let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);\n# let mut client = mbm::client::AsyncClient::tcp(port);\n# macro_rules! pump { () => { client.port().device.units.device } }\n",
-            $before, "\n", $call, ".await?;\n", $after, "\n# Ok(())\n# }\n",
-            "# fn main() { assert_eq!(block_on(example()), Ok(())); }\n```"
-        )
+    ([async] $($shown:literal),*) => {
+        call_example!([async] "# let port = mbm::port::AsyncIo::stream(tcp(), micros, Delay);\n# let mut client = mbm::client::AsyncClient::tcp(port);\n# macro_rules! pump { () => { client.port().device.units.device } }\n", $($shown),*)
     };
 }
 

@@ -2,25 +2,13 @@
 //! ModbusMaster, and reads into arrays. A master that blocks and one whose functions are futures have
 //! the same.
 
-/// The example of a call: what is before it, the call, what is after it. The documentation hides the rest.
+/// The example of a call: what is before it, the call, what is after it.
 macro_rules! example {
-    ([] $before:literal, $call:literal, $after:literal) => {
-        concat!(
-            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
-            "# fn main() -> Result<(), mbm::Error> {\n",
-            "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::Master::new(17, rtu(), buffers);\n# macro_rules! pump { () => { master.port().units.device } }\n",
-            $before, "\n", $call, "?;\n", $after, "\n# Ok(())\n# }\n```"
-        )
+    ([] $($shown:literal),*) => {
+        call_example!([] "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::Master::new(17, rtu(), buffers);\n# macro_rules! pump { () => { master.port().units.device } }\n", $($shown),*)
     };
-    ([async] $before:literal, $call:literal, $after:literal) => {
-        concat!(
-            "\n```\n# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/pump.rs\"));\n",
-            "# include!(concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/tests/doc/executor.rs\"));\n",
-            "# async fn example() -> Result<(), mbm::Error> {\n",
-            "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::AsyncMaster::new(17, rtu(), micros, Delay, buffers);\n# macro_rules! pump { () => { master.device().units.device } }\n",
-            $before, "\n", $call, ".await?;\n", $after, "\n# Ok(())\n# }\n",
-            "# fn main() { assert_eq!(block_on(example()), Ok(())); }\n```"
-        )
+    ([async] $($shown:literal),*) => {
+        call_example!([async] "# let buffers = mbm::master::Buffers::new([0; 64], [0; 20], [0; 20]);\n# let mut master = mbm::master::AsyncMaster::new(17, rtu(), micros, Delay, buffers);\n# macro_rules! pump { () => { master.device().units.device } }\n", $($shown),*)
     };
 }
 
