@@ -498,6 +498,16 @@ TEST(a_uart_that_switches_the_driver_itself_passes)
     run_right(uart, 0);
 }
 
+/* The interrupt of transmission complete switches it off, between any two calls of the test. */
+TEST(a_driver_that_an_interrupt_switches_off_passes)
+{
+    model_uart uart = with_interrupt();
+
+    uart.ownDriver = 1;
+    for (uart.callNs = 5000; uart.callNs < 40000; uart.callNs += 500)
+        run_right(uart, 1);
+}
+
 /* Half a character is shorter than its tick. */
 TEST(a_port_with_a_tick_of_a_millisecond_passes)
 {

@@ -122,7 +122,7 @@ uint8_t mbm_portTest_drain(mbm_portTest *test, const mbm_port *port)
 typedef struct times {
     uint32_t began;
     uint32_t progress; /* the last time that a byte moved */
-    uint32_t sure;     /* until then the last bit has not left */
+    uint32_t sure;     /* so long after it the last bit has surely not left; 0: not known */
     uint32_t readAt;   /* of the last byte */
 } times;
 
@@ -190,16 +190,20 @@ static void end(mbm_portTest *test, passage *bytes, times *when)
     switch_driver(test, bytes, port->postTransmission);
 }
 
-/* The pin, while the bytes leave. */
+/* The pin, while the bytes leave. It is read before the clock: the task may be away between them,
+ * and the driver goes off rightly meanwhile. */
 static void watch_driver(mbm_portTest *test, passage *bytes, const times *when)
 {
-    const uint32_t us = mbm_portTest_since(test, when->began);
+    uint32_t us;
 
     if (test->driver == NULL || bytes->from != test->port || bytes->isFlushed)
         return;
-    if (test->driver(test->context))
+    if (test->driver(test->context)) {
         bytes->wentOn = 1;
-    else if (bytes->wentOn && !bytes->wentOff && us < when->sure) {
+        return;
+    }
+    us = mbm_portTest_since(test, when->began);
+    if (bytes->wentOn && !bytes->wentOff && us < when->sure) {
         bytes->wentOff = 1;
         bytes->offUs = us;
     }
@@ -275,11 +279,12 @@ static void move(mbm_portTest *test, passage *bytes)
     const uint32_t now = mbm_portTest_now(test);
     /* Bytes that were taken leave one by one. */
     const uint32_t lasts = mbm_portTest_characters(test, bytes->length),
-                   patience = PATIENCE + lasts;
-    times when = {now, now, now, lasts};
+                   patience = PATIENCE + lasts,
+                   /* The clock shows up to a step less than has passed. */
+        margin = mbm_portTest_characters(test, 1) / 2 + test->stepUs;
+    times when = {
+        .began = now, .progress = now, .sure = lasts > margin ? lasts - margin : 0, .readAt = now};
 
-    if (lasts > 0)
-        when.sure -= mbm_portTest_characters(test, 1) / 2;
     while (!test->isOver && !is_done(bytes) && mbm_portTest_since(test, when.progress) < patience) {
         if (bytes->taken < bytes->length)
             send(test, bytes, &when);
