@@ -29,6 +29,7 @@ TLS_TESTS := $(filter test_tls%,$(TESTS))
 # The test kit for ports, and its own tests.
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
+LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
@@ -248,7 +249,7 @@ need-check:
 		$(FIRMWARE_LIBC)
 need-test:
 	@scripts/need python3 python3-venv gcc g++ clang libclang-rt-14-dev libc6-dev pkg-config libmodbus-dev libcmocka-dev \
-		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev libmosquitto-dev openssl
+		perl valgrind mbpoll libmbedtls-dev libyaml-dev libcjson-dev liblwip-dev libmosquitto-dev openssl
 
 # With each object the compiler writes a list of the headers that it includes.
 DEPENDS := -MMD -MP
@@ -290,6 +291,9 @@ $(BUILD)/$(1)/test_pico: $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico
 $(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
+$(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener lwip_wire)
+$(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
+$(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/freertos
@@ -458,14 +462,14 @@ archive-aarch64: $(AARCH64_ARCHIVE) ## Build the library with its ports for 64-b
 	@echo "archive-aarch64: $(AARCH64_FOLDER)/linux/libmbm.a, by $$(cat $(AARCH64_FOLDER)/compiler)"
 
 # The old tag of -rpath counts for the libraries of libraries too.
-$(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include \
+$(eval $(call variant,aarch64,$(AARCH64)-gcc,$(AARCH64)-g++,-isystem $(AARCH64_ROOT)/usr/include -isystem $(AARCH64_ROOT)/usr/include/lwip \
     -L$(AARCH64_LIBRARIES) -Wl$(comma)--disable-new-dtags$(comma)-rpath$(comma)$(CURDIR)/$(AARCH64_LIBRARIES),$(AARCH64_ARCHIVE)))
 
 test-aarch64: ## Run the tests in C as programs for AArch64 under QEMU: TESTS, TEST as for test-c
 	@scripts/need gcc-aarch64-linux-gnu g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user perl mbpoll openssl \
 		pkg-config libmodbus-dev
 	@scripts/need --unpack arm64 $(AARCH64_ROOT) libmodbus-dev libmodbus5 libcmocka-dev libcmocka0 libyaml-dev libyaml-0-2 libcjson-dev libcjson1 \
-		libmosquitto-dev libmosquitto1 libssl3 \
+		liblwip-dev liblwip0 libmosquitto-dev libmosquitto1 libssl3 \
 		libmbedtls-dev libmbedtls14 libmbedx509-1 libmbedcrypto7
 	@$(MAKE) --no-print-directory -j$(JOBS) run-c-tests BUILDS=aarch64
 

@@ -475,7 +475,7 @@ static void find_silent_host(int *listener, int *filler, char *service)
 
     *listener = tcp_listen(&port);
     assert_int_equal(listen(*listener, 0), 0);
-    *filler = tcp_connect(port);
+    *filler = tcp_connectTo(port);
     sprintf(service, "%u", port);
 }
 

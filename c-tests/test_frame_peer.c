@@ -219,7 +219,7 @@ TEST(mbm_parses_the_responses_of_libmodbus_over_tcp)
     tcp_server peer;
 
     tcp_server_start(&peer);
-    int fd = tcp_connect(peer.port);
+    int fd = tcp_connectTo(peer.port);
     answers_what_we_parse(fd, &tcp, peer.mapping);
     close(fd);
     tcp_server_stop(&peer);

@@ -169,11 +169,11 @@ TEST(exceptions_of_a_device_pass_through)
 
 TEST(every_function_passes_through)
 {
-    int fd = tcp_connect((uint16_t)port);
+    int fd = tcp_connectTo((uint16_t)port);
 
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    fd = tcp_connect((uint16_t)port);
+    fd = tcp_connectTo((uint16_t)port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
 }
@@ -218,7 +218,7 @@ TEST(requests_of_many_connections_wait_for_their_turn)
     int fds[MANY];
 
     for (unsigned i = 0; i < MANY; i++)
-        fds[i] = tcp_connect((uint16_t)port);
+        fds[i] = tcp_connectTo((uint16_t)port);
     for (unsigned round = 0; round < 5; round++) {
         for (unsigned i = 0; i < MANY; i++) {
             uint8_t request[] = {
@@ -256,7 +256,7 @@ TEST(a_line_that_waits_does_not_delay_another)
     static const uint8_t absent[] = {0, 1, 0, 0, 0, 6, ABSENT, 3, 0, 0, 0, 1};
     uint8_t answer[600];
     uint16_t word;
-    int fd = tcp_connect((uint16_t)port);
+    int fd = tcp_connectTo((uint16_t)port);
     unsigned i, attempts;
 
     modbus_set_slave(client, SERVED_UNIT);
@@ -281,7 +281,7 @@ TEST(a_connection_that_breaks_gives_up_its_request)
 
     for (unsigned i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
-        int fd = tcp_connect((uint16_t)port);
+        int fd = tcp_connectTo((uint16_t)port);
 
         assert_int_equal(write(fd, request, sizeof request), sizeof request);
         if (i % 2)
@@ -298,7 +298,7 @@ TEST(connections_beyond_the_places_are_closed)
     int fds[40];
 
     for (unsigned i = 0; i < COUNT(fds); i++)
-        fds[i] = tcp_connect((uint16_t)port);
+        fds[i] = tcp_connectTo((uint16_t)port);
     /* One of the places is the client's. */
     for (unsigned i = 0; i < COUNT(fds); i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < PLACES - 1);

@@ -150,7 +150,7 @@ TEST(a_late_reply_to_one_client_does_not_reach_another)
         const late *c = &cases[i];
 
         start(&gateways[i], TIMEOUT, NULL);
-        first[i] = tcp_connect(gateways[i].port);
+        first[i] = tcp_connectTo(gateways[i].port);
         send_request(first[i], (const uint8_t *)c->request, c->lengths[0]);
         expect_request(&gateways[i], (const uint8_t *)c->request, c->lengths[0]);
     }
@@ -159,7 +159,7 @@ TEST(a_late_reply_to_one_client_does_not_reach_another)
         const uint8_t no_response[] = {(uint8_t)(c->request[0] | 0x80), 0x0B};
 
         expect(first[i], no_response, sizeof no_response);
-        second = tcp_connect(gateways[i].port);
+        second = tcp_connectTo(gateways[i].port);
         send_request(second, (const uint8_t *)c->other, c->lengths[2]);
         expect_request(&gateways[i], (const uint8_t *)c->other, c->lengths[2]);
         reply(&gateways[i], (const uint8_t *)c->late_reply, c->lengths[1]);
@@ -185,7 +185,7 @@ TEST(a_reply_that_does_not_answer_the_request_becomes_0b)
     gateway g;
 
     start(&g, "500ms", NULL);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     for (unsigned i = 0; i < COUNT(no_answers); i++) {
         const uint8_t *request = (const uint8_t *)no_answers[i][0];
         const uint8_t no_response[] = {request[0] | 0x80, 0x0B};
@@ -205,7 +205,7 @@ TEST(a_request_that_the_standard_forbids_does_not_reach_the_line)
     struct pollfd asked = {0, POLLIN, 0};
 
     start(&g, TIMEOUT, NULL);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     ASK(fd, "\x03\x00\x64\x00\x00");
     EXPECT(fd, "\x83\x03");
     ASK(fd, "\x03\xFF\xFF\x00\x02");
@@ -223,7 +223,7 @@ TEST(force_listen_only_mode_is_passed_on_and_gets_no_response)
     gateway g;
 
     start(&g, TIMEOUT, NULL);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     ASK(fd, "\x08\x00\x04\x00\x00");
     REQUEST(&g, "\x08\x00\x04\x00\x00");
     ASK(fd, "\x07");
@@ -239,7 +239,7 @@ TEST(unknown_functions_pass_through)
     gateway g;
 
     start(&g, TIMEOUT, NULL);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     ASK(fd, "\x64 any data");
     REQUEST(&g, "\x64 any data");
     REPLY(&g, "\x64 of any length at all");
@@ -266,10 +266,10 @@ TEST(every_function_of_our_server_passes_through)
     served_prepare(&ours);
     served_on_line(&ours, MBM_FRAMING_RTU);
     start_at(&g, ours.line.path, TIMEOUT, NULL);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     asked_functions(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
-    fd = tcp_connect(g.port);
+    fd = tcp_connectTo(g.port);
     asked_lies(fd, MBM_FRAMING_TCP, &ours);
     close(fd);
     modbus_t *client = modbus_new_tcp("127.0.0.1", g.port);
@@ -301,7 +301,7 @@ TEST(the_quiet_time_is_an_option)
     gateway g;
 
     start(&g, "200ms", options);
-    int fd = tcp_connect(g.port);
+    int fd = tcp_connectTo(g.port);
     double before = seconds();
     ASK(fd, "\x03\x00\x00\x00\x03");
     REQUEST(&g, "\x03\x00\x00\x00\x03");

@@ -70,7 +70,7 @@ static void stop(void)
 static void connect_to(unsigned first, unsigned last)
 {
     for (; first < last; first++)
-        fds[first] = tcp_connect(port);
+        fds[first] = tcp_connectTo(port);
 }
 
 static int is_served(int fd)
@@ -120,7 +120,7 @@ TEST(connections_beyond_the_descriptors_are_closed_at_once)
     for (; i < ALL; i++)
         assert_int_equal(is_served(fds[i]), 0);
     close_from_to(0, ALL);
-    AWAIT((fds[0] = tcp_connect(port), is_served(fds[0])) || (close(fds[0]), 0));
+    AWAIT((fds[0] = tcp_connectTo(port), is_served(fds[0])) || (close(fds[0]), 0));
     stop();
 }
 
@@ -131,7 +131,7 @@ TEST(a_new_client_gets_the_place_of_an_idle_one)
     start(0, "1s");
     connect_to(0, PLACES);
     /* The connections are silent for at least a second. */
-    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
+    AWAIT((fds[PLACES] = tcp_connectTo(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
     /* The first connection has been idle for longest. */
     assert_int_equal(recv(fds[0], &byte, 1, 0), 0);
     assert_int_equal(is_served(fds[PLACES]), 1);
@@ -146,7 +146,7 @@ TEST(a_new_client_gets_the_descriptor_of_an_idle_one)
     start(OWN + SERVED, "1s");
     connect_to(0, SERVED);
     for (unsigned i = SERVED; i < SERVED + 2; i++)
-        AWAIT((fds[i] = tcp_connect(port), is_served(fds[i])) || (close(fds[i]), 0));
+        AWAIT((fds[i] = tcp_connectTo(port), is_served(fds[i])) || (close(fds[i]), 0));
     stop();
 }
 
@@ -171,7 +171,7 @@ TEST(a_connection_that_waits_for_its_device_is_not_idle)
     /* The request is on the line before the other clients connect. */
     assert_int_equal(read(line.ours, answer, 1), 1);
     connect_to(1, PLACES);
-    AWAIT((fds[PLACES] = tcp_connect(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
+    AWAIT((fds[PLACES] = tcp_connectTo(port), is_served(fds[PLACES])) || (close(fds[PLACES]), 0));
     assert_int_equal(recv(fds[0], answer, sizeof answer, MSG_WAITALL), sizeof answer);
     assert_int_equal(answer[8], 0x0B);
     stop();

@@ -46,7 +46,7 @@ static void start_without_client(const char *host, uint16_t to, const char *cons
 static void start(const char *host, uint16_t to, const char *const *options)
 {
     start_without_client(host, to, options);
-    client = tcp_connect(port);
+    client = tcp_connectTo(port);
 }
 
 static void stop(void)
@@ -287,7 +287,7 @@ static void expect_places(const char *const *options, unsigned places)
     listener = tcp_listen(&device_port);
     start_without_client("tcp://127.0.0.1", device_port, options);
     for (unsigned i = 0; i < MANY; i++)
-        fds[i] = tcp_connect(port);
+        fds[i] = tcp_connectTo(port);
     for (unsigned i = 0; i < MANY; i++)
         assert_int_equal(asked_is_served(fds[i], NO_LINE, 0x0A), i < places);
     for (unsigned i = 0; i < MANY; i++)

@@ -340,7 +340,7 @@ TEST(servers_and_clients_share_a_loop)
 TEST(bytes_that_are_no_modbus_end_the_connection_of_a_server)
 {
     begin_to_listen();
-    int peer = tcp_connect(listener.port);
+    int peer = tcp_connectTo(listener.port);
     LOOP_UNTIL(&loop, places_in_use() == 1);
     assert_int_equal(write(peer, "GET / HTTP/1.1\r\n\r\n", 18), 18);
     LOOP_UNTIL(&loop, places_in_use() == 0);
@@ -355,10 +355,10 @@ TEST(without_a_descriptor_connections_wait_and_are_accepted_later)
 
     SKIP_WITHOUT_LIMITS();
     begin_to_listen();
-    peers[0] = tcp_connect(listener.port);
+    peers[0] = tcp_connectTo(listener.port);
     LOOP_UNTIL(&loop, places_in_use() == 1);
     for (i = 1; i < 3; i++)
-        peers[i] = tcp_connect(listener.port);
+        peers[i] = tcp_connectTo(listener.port);
     /* The spare descriptor is gone too, so the connections cannot even be closed. */
     close(listener.spare);
     next = dup(0);

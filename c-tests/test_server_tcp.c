@@ -58,7 +58,7 @@ static void all_places_are_free(void)
         if (tries++ == PATIENCE_MS / 10)
             fail_msg("of %u places %u are free", FREE, taken);
         for (i = 0; i < FREE; i++)
-            fds[i] = tcp_connect((uint16_t)tcp.port);
+            fds[i] = tcp_connectTo((uint16_t)tcp.port);
         for (i = taken = 0; i < FREE; i++)
             taken += (unsigned)asked_is_served(fds[i], SERVED_UNIT, 0x6D);
         for (i = 0; i < FREE; i++)
@@ -86,7 +86,7 @@ TEST(libmodbus_without_a_unit_is_answered)
 
 TEST(every_function_is_served)
 {
-    int fd = tcp_connect((uint16_t)tcp.port), other = tcp_connect((uint16_t)rtu.port);
+    int fd = tcp_connectTo((uint16_t)tcp.port), other = tcp_connectTo((uint16_t)rtu.port);
 
     asked_functions(fd, MBM_FRAMING_TCP, &tcp);
     asked_lies(fd, MBM_FRAMING_TCP, &tcp);
@@ -100,7 +100,7 @@ TEST(requests_in_one_segment_are_answered_in_turn)
 {
     static const uint8_t one[] = {0, 1, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
     uint8_t bytes[20 * sizeof one], answer[600];
-    int fd = tcp_connect((uint16_t)tcp.port);
+    int fd = tcp_connectTo((uint16_t)tcp.port);
 
     for (unsigned i = 0; i < 20; i++) {
         memcpy(bytes + i * sizeof one, one, sizeof one);
@@ -116,7 +116,7 @@ TEST(requests_in_one_segment_are_answered_in_turn)
 TEST(slow_and_half_open_connections_do_not_stall_others)
 {
     static const uint8_t one[] = {0, 7, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 1};
-    int slow = tcp_connect((uint16_t)tcp.port), silent = tcp_connect((uint16_t)tcp.port);
+    int slow = tcp_connectTo((uint16_t)tcp.port), silent = tcp_connectTo((uint16_t)tcp.port);
     uint8_t answer[600];
     uint16_t word;
     unsigned i;
@@ -163,7 +163,7 @@ TEST(a_client_that_reads_nothing_does_not_stall_others)
 {
     static uint8_t answers[300];
     uint8_t one[] = {0, 0, 0, 0, 0, 6, SERVED_UNIT, 4, 0, SERVED_BASE, 0, 125};
-    int fd = tcp_connect((uint16_t)tcp.port), theirs;
+    int fd = tcp_connectTo((uint16_t)tcp.port), theirs;
     size_t sent = 0, i;
     unsigned naps = 0;
 
@@ -200,7 +200,7 @@ TEST(further_connections_are_closed_and_the_others_served)
     int fds[SERVED_CONNECTIONS + 8];
 
     for (unsigned i = 0; i < COUNT(fds); i++) {
-        fds[i] = tcp_connect((uint16_t)tcp.port);
+        fds[i] = tcp_connectTo((uint16_t)tcp.port);
         go_round();
     }
     for (unsigned i = 0; i < COUNT(fds); i++)
@@ -213,7 +213,7 @@ TEST(further_connections_are_closed_and_the_others_served)
 TEST(a_stream_that_is_not_modbus_is_closed)
 {
     uint8_t byte;
-    int fd = tcp_connect((uint16_t)tcp.port);
+    int fd = tcp_connectTo((uint16_t)tcp.port);
     struct pollfd readable = {fd, POLLIN, 0};
 
     assert_int_equal(write(fd, "GET / HTTP/1.0\r\n\r\n", 18), 18);
@@ -227,7 +227,7 @@ TEST(a_connection_that_breaks_frees_its_place)
     const struct linger hard = {1, 0};
 
     for (unsigned i = 0; i < 50; i++) {
-        int fd = tcp_connect((uint16_t)tcp.port);
+        int fd = tcp_connectTo((uint16_t)tcp.port);
 
         assert_int_equal(write(fd, "\0\1\0\0\0\6", i % 7), i % 7);
         if (i % 2)

@@ -200,7 +200,7 @@ static void over_tcp(uint8_t apart)
     uint16_t port;
 
     tcp_server_start(&device);
-    int to_server = tcp_connect(device.port);
+    int to_server = tcp_connectTo(device.port);
     int proxy = tcp_listen(&port);
     modbus_t *client = modbus_new_tcp("127.0.0.1", port);
     modbus_set_slave(client, 17);

@@ -26,7 +26,7 @@ static void begin(void)
 {
     peer = tcp_peer_new();
     port = tcp_peer_start(peer, 0);
-    s = tcp_connect(port);
+    s = tcp_connectTo(port);
 }
 
 static void end(void)
@@ -326,12 +326,12 @@ TEST(close_ends_the_stream_and_reset_resets_it)
     send_request(1);
     assert_int_equal(receive(&byte, 1, PATIENCE_MS), 0);
     close(s);
-    s = tcp_connect(port);
+    s = tcp_connectTo(port);
     send_request(2);
     assert_int_equal(receive(&byte, 1, PATIENCE_MS), -1);
     assert_int_equal(errno, ECONNRESET);
     close(s);
-    s = tcp_connect(port);
+    s = tcp_connectTo(port);
     send_request(3);
     expect(3);
     assert_int_equal(tcp_peer_count(peer).connections, 3);
@@ -355,7 +355,7 @@ TEST(a_connection_beyond_the_limit_is_refused)
     send_request(1);
     expect(1);
     for (unsigned i = 0; i < TCP_PEER_CONNECTIONS; i++)
-        others[i] = tcp_connect(port);
+        others[i] = tcp_connectTo(port);
     s = others[TCP_PEER_CONNECTIONS - 1];
     assert_true(receive(&byte, 1, PATIENCE_MS) <= 0);
     s = others[TCP_PEER_CONNECTIONS - 2];
@@ -378,7 +378,7 @@ TEST(hang_up_and_a_restart_at_the_same_port)
     tcp_peer_halt(peer);
     close(s);
     assert_int_equal(tcp_peer_start(peer, port), port);
-    s = tcp_connect(port);
+    s = tcp_connectTo(port);
     send_request(2);
     expect(2);
 }

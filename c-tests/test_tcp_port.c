@@ -132,7 +132,7 @@ TEST(until_connected_nothing_is_read_or_written)
     assert_int_equal(bind(listener, (struct sockaddr *)&address, size), 0);
     assert_int_equal(listen(listener, 0), 0);
     assert_int_equal(getsockname(listener, (struct sockaddr *)&address, &size), 0);
-    first = tcp_connect(ntohs(address.sin_port));
+    first = tcp_connectTo(ntohs(address.sin_port));
     snprintf(service, sizeof service, "%u", ntohs(address.sin_port));
 
     assert_int_equal(mbm_tcp_open(&tcp, &addresses, "127.0.0.1", service), 0);
@@ -290,7 +290,7 @@ TEST(wait_ends_with_the_time_or_with_any_of_its_sockets)
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
     assert_int_equal(read(pipes[0], &byte, 1), 1);
 
-    client = tcp_connect(listener.port);
+    client = tcp_connectTo(listener.port);
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], MBM_TCP_FOREVER), 1);
     assert_int_equal(mbm_tcp_accept(&listener, many + 1, 2), 0);
     assert_int_equal(mbm_tcp_wait(many, 3, &listener, pipes[0], 1000), 0);
@@ -324,7 +324,7 @@ TEST(a_connection_without_a_place_is_ended_without_a_reset)
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     for (i = 0; i < 4; i++) {
-        clients[i] = tcp_connect(listener.port);
+        clients[i] = tcp_connectTo(listener.port);
         assert_int_equal(write(clients[i], "x", 1), 1);
     }
     AWAIT(waiting(&listener) == 4);
@@ -340,13 +340,13 @@ TEST(a_connection_without_a_place_is_ended_without_a_reset)
     mbm_port line = mbm_tcp_port(&places[0]);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) == 1);
     AWAIT(line.read(line.context, (uint8_t *)&byte, 1) < 0);
-    clients[0] = tcp_connect(listener.port);
+    clients[0] = tcp_connectTo(listener.port);
     AWAIT(waiting(&listener) == 1);
     FAILS(EAGAIN, mbm_tcp_accept(&listener, places, 2));
     assert_int_equal(listener.refused, 3);
     mbm_tcp_close(&places[0]);
     close(clients[2]);
-    clients[2] = tcp_connect(listener.port);
+    clients[2] = tcp_connectTo(listener.port);
     AWAIT(waiting(&listener) == 1);
     assert_int_equal(mbm_tcp_accept(&listener, places, 2), 0);
 
@@ -445,7 +445,7 @@ TEST(a_server_listens_again_at_once_after_it_closed_a_connection)
 
     assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
     snprintf(service, sizeof service, "%u", listener.port);
-    int client = tcp_connect(listener.port);
+    int client = tcp_connectTo(listener.port);
     assert_int_equal(mbm_tcp_wait(NULL, 0, &listener, -1, PATIENCE), 1);
     assert_int_equal(mbm_tcp_accept(&listener, &accepted, 1), 0);
     mbm_tcp_close(&accepted);

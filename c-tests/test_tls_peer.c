@@ -239,7 +239,7 @@ static size_t read_to_end(int fd, uint8_t *bytes, size_t capacity)
 
 TEST(a_client_without_tls_is_refused)
 {
-    int fd = tcp_connect(listener.port);
+    int fd = tcp_connectTo(listener.port);
     uint8_t received[64];
 
     assert_int_equal(write(fd, ask, sizeof ask), sizeof ask);
@@ -252,7 +252,7 @@ TEST(a_client_without_tls_is_refused)
 TEST(a_client_that_closes_its_half_in_the_handshake_is_dropped)
 {
     static const uint8_t part[] = {22, 3, 1, 0, 200, 1, 0, 0, 196};
-    int fd = tcp_connect(listener.port);
+    int fd = tcp_connectTo(listener.port);
     uint8_t received[64];
 
     assert_int_equal(write(fd, part, sizeof part), sizeof part);
@@ -415,7 +415,7 @@ TEST(many_connections_keep_their_roles_apart)
     for (unsigned i = 0; i < 3; i++)
         tls_identify(&who[i], names[i], "authority", 0);
     for (unsigned i = 0; i < count; i++) {
-        assert_int_equal(mbm_tcp_attach(&askers[i].tcp, tcp_connect(listener.port)), 0);
+        assert_int_equal(mbm_tcp_attach(&askers[i].tcp, tcp_connectTo(listener.port)), 0);
         start_asking(&askers[i], &who[i % 3], "localhost");
         go_round_after(-1, AT_ONCE);
     }

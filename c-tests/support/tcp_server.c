@@ -47,7 +47,7 @@ int tcp_reserve(uint16_t *port)
     return fd;
 }
 
-int tcp_connect(uint16_t port)
+int tcp_connectTo(uint16_t port)
 {
     struct sockaddr_in to;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);

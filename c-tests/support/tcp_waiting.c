@@ -24,6 +24,6 @@ void tcp_connect_some(int *fds, unsigned count, int listener, uint16_t port)
     const unsigned before = tcp_waiting(listener);
 
     for (unsigned i = 0; i < count; i++)
-        fds[i] = tcp_connect(port);
+        fds[i] = tcp_connectTo(port);
     AWAIT(tcp_waiting(listener) == before + count);
 }

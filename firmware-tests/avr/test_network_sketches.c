@@ -63,7 +63,7 @@ TEST(the_tcp_client_reads_and_writes_a_device)
     tcp_server_start(&s);
     s.mapping->tab_registers[10] = 300;
     s.mapping->tab_registers[11] = 33;
-    fd = tcp_connect(s.port);
+    fd = tcp_connectTo(s.port);
     network = board_uart(b, '0', to_server, &fd);
     assert_true(board_run(b, 350 * MS));
     assert_int_equal(s.mapping->tab_registers[20], 333);

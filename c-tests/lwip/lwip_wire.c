@@ -1,0 +1,154 @@
+#include "lwip_wire.h"
+
+#include "lwip/init.h"
+#include "lwip/ip.h"
+#include "lwip/netif.h"
+#include "lwip/priv/tcp_priv.h"
+#include "lwip/sys.h"
+#include "lwip/timeouts.h"
+#include "test.h"
+
+wire the_wire;
+
+/* The packets that are under way, of at most 1500 bytes each. */
+enum { PACKETS = 1024, BYTES = 1500, SOURCE = 12, TARGET = 16, FLAGS = 13, RST = 4 };
+static struct {
+    uint16_t length;
+    uint8_t bytes[BYTES];
+} packets[PACKETS];
+static uint32_t sent, delivered;
+
+static struct netif netif;
+
+/* Takes the place of that of the library. */
+u32_t sys_now(void)
+{
+    return the_wire.ms;
+}
+
+static err_t send_packet(struct netif *from, struct pbuf *p, const ip4_addr_t *target)
+{
+    uint8_t *bytes = packets[sent % PACKETS].bytes, swapped[4];
+
+    if (the_wire.isCut)
+        return ERR_OK;
+    assert_true(sent - delivered < PACKETS);
+    packets[sent % PACKETS].length = pbuf_copy_partial(p, bytes, BYTES, 0);
+    /* The checksums of IP and TCP stay right, since they are sums. */
+    memcpy(swapped, bytes + SOURCE, 4);
+    memcpy(bytes + SOURCE, bytes + TARGET, 4);
+    memcpy(bytes + TARGET, swapped, 4);
+    sent++;
+    return ERR_OK;
+}
+
+static err_t begin_interface(struct netif *interface)
+{
+    interface->name[0] = 'w';
+    interface->name[1] = 'i';
+    interface->mtu = BYTES;
+    interface->output = send_packet;
+    return ERR_OK;
+}
+
+/* Returns a packet as a chain of pbufs. The headers are in the first one. */
+static struct pbuf *chain_of(const uint8_t *bytes, uint16_t length)
+{
+    const uint16_t ip = (uint16_t)(4 * (bytes[0] & 0xF));
+    const uint16_t headers = (uint16_t)(ip + 4 * (bytes[ip + 12] >> 4));
+    const uint16_t data = (uint16_t)(length - headers);
+    uint16_t at = 0, part = length;
+    struct pbuf *chain = NULL, *next;
+
+    if (the_wire.first != 0 && the_wire.first < data)
+        part = (uint16_t)(headers + the_wire.first);
+    while (at < length) {
+        next = pbuf_alloc(PBUF_RAW, part, PBUF_POOL);
+        assert_non_null(next);
+        assert_int_equal(pbuf_take(next, bytes + at, part), ERR_OK);
+        if (chain)
+            pbuf_cat(chain, next);
+        else
+            chain = next;
+        at = (uint16_t)(at + part);
+        part = (uint16_t)(length - at);
+        if (the_wire.others != 0 && the_wire.others < part)
+            part = the_wire.others;
+    }
+    return chain;
+}
+
+void wire_deliver(void)
+{
+    while (delivered != sent) {
+        const uint8_t *bytes = packets[delivered % PACKETS].bytes;
+        const uint16_t length = packets[delivered % PACKETS].length;
+
+        delivered++;
+        the_wire.packets++;
+        the_wire.resets += (bytes[4 * (bytes[0] & 0xF) + FLAGS] & RST) != 0;
+        assert_int_equal(netif.input(chain_of(bytes, length), &netif), ERR_OK);
+    }
+}
+
+void wire_pass(uint32_t ms, void (*each)(void))
+{
+    const uint32_t end = the_wire.ms + ms;
+
+    do {
+        the_wire.ms += end - the_wire.ms < 50 ? end - the_wire.ms : 50;
+        sys_check_timeouts();
+        wire_deliver();
+        if (each)
+            each();
+        wire_deliver();
+    } while (the_wire.ms != end);
+}
+
+void wire_begin(void)
+{
+    const uint32_t ms = the_wire.ms;
+    static int has_begun;
+    ip4_addr_t address, mask, gateway;
+
+    memset(&the_wire, 0, sizeof the_wire);
+    the_wire.ms = ms;
+    sent = delivered = 0;
+    IP_ADDR4(&the_wire.far, 10, 0, 0, 2);
+    if (has_begun)
+        return;
+    has_begun = 1;
+    /* So that sums of times wrap within the test. */
+    the_wire.ms = UINT32_MAX - 100000;
+    lwip_init();
+    IP4_ADDR(&address, 10, 0, 0, 1);
+    IP4_ADDR(&mask, 255, 255, 255, 0);
+    IP4_ADDR(&gateway, 0, 0, 0, 0);
+    assert_non_null(netif_add(&netif, &address, &mask, &gateway, NULL, begin_interface, ip_input));
+    netif_set_default(&netif);
+    netif_set_up(&netif);
+    wire_plug();
+}
+
+void wire_end(void)
+{
+    the_wire.isCut = 0;
+    wire_plug();
+    wire_pass(1000, NULL);
+    assert_null(tcp_listen_pcbs.listen_pcbs);
+    while (tcp_active_pcbs)
+        tcp_abort(tcp_active_pcbs);
+    while (tcp_tw_pcbs)
+        tcp_abort(tcp_tw_pcbs);
+    wire_pass(1000, NULL);
+}
+
+void wire_unplug(void)
+{
+    netif_set_link_down(&netif);
+}
+
+void wire_plug(void)
+{
+    netif_set_link_up(&netif);
+}
