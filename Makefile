@@ -30,6 +30,8 @@ TLS_TESTS := $(filter test_tls%,$(TESTS))
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
 LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
+# Those with a wire in memory. The others have lwIP's own thread.
+LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_porttest_lwip,$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
@@ -291,9 +293,12 @@ $(BUILD)/$(1)/test_pico: $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico
 $(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
-$(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener lwip_wire)
+$(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
+$(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,lwip_wire lwip_pair)
+$(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): LIBS += -Wl$(comma)--wrap=tcp_write$(comma)--wrap=tcp_new_ip_type
+$(patsubst %,$(BUILD)/$(1)/test_%,lwip_task porttest_lwip): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/freertos

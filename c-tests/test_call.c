@@ -473,7 +473,7 @@ static void find_silent_host(int *listener, int *filler, char *service)
 {
     uint16_t port;
 
-    *listener = tcp_listen(&port);
+    *listener = tcp_listenOnFree(&port);
     assert_int_equal(listen(*listener, 0), 0);
     *filler = tcp_connectTo(port);
     sprintf(service, "%u", port);

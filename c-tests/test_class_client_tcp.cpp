@@ -206,7 +206,7 @@ TEST(poll_never_waits_for_a_device)
 TEST(rtu_frames_are_sent_over_a_tcp_connection)
 {
     uint16_t port;
-    int listener = tcp_listen(&port);
+    int listener = tcp_listenOnFree(&port);
     ModbusRequestOf<1> request(17);
     networkPort(4001) = port;
     OK(client->beginRtuOverTcp(*ethernet));

@@ -260,7 +260,7 @@ TEST(every_request_ends_once_and_with_its_own_data)
     uint16_t port;
 
     total = fewer ? strtoul(fewer, NULL, 10) : 200000;
-    d.listener = tcp_listen(&port);
+    d.listener = tcp_listenOnFree(&port);
     d.peer = -1;
     d.random = 1;
     held_clock_start(&d.clock);

@@ -126,7 +126,7 @@ TEST(mbm_builds_the_requests_that_libmodbus_sends_over_rtu)
 TEST(mbm_builds_the_requests_that_libmodbus_sends_over_tcp)
 {
     uint16_t port;
-    int listener = tcp_listen(&port), peer;
+    int listener = tcp_listenOnFree(&port), peer;
 
     modbus_t *client = modbus_new_tcp("127.0.0.1", port);
     assert_non_null(client);

@@ -160,7 +160,7 @@ TEST(a_line_of_rtu_over_tcp_has_frames_of_rtu)
     uint8_t request[] = {UNIT, 3, 0, 7, 0, 1, 0, 0}, response[] = {UNIT, 3, 2, 0, 9, 0, 0};
     uint8_t found[sizeof request];
 
-    listener = tcp_listen(&device_port);
+    listener = tcp_listenOnFree(&device_port);
     start("rtu+tcp://127.0.0.1", device_port, NULL);
     int device = accept_gateway();
     ask(7);
@@ -179,7 +179,7 @@ TEST(a_device_that_closes_an_idle_connection_costs_no_request)
 {
     int device;
 
-    listener = tcp_listen(&device_port);
+    listener = tcp_listenOnFree(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
     for (uint8_t round = 1; round < 6; round++) {
         device = accept_gateway();
@@ -202,7 +202,7 @@ TEST(a_device_that_closes_an_idle_connection_costs_no_request)
 
 TEST(a_request_whose_connection_is_lost_gets_0a_and_is_not_sent_again)
 {
-    listener = tcp_listen(&device_port);
+    listener = tcp_listenOnFree(&device_port);
     start("tcp://127.0.0.1", device_port, NULL);
     int device = accept_gateway();
     ask(1);
@@ -257,7 +257,7 @@ TEST(a_line_of_tcp_has_as_many_requests_at_once_as_the_option_says)
     uint16_t transactions[4];
     uint8_t byte;
 
-    listener = tcp_listen(&device_port);
+    listener = tcp_listenOnFree(&device_port);
     start("tcp://127.0.0.1", device_port, options);
     int device = accept_gateway();
     for (int i = 0; i < 6; i++)
@@ -284,7 +284,7 @@ static void expect_places(const char *const *options, unsigned places)
 {
     int fds[MANY];
 
-    listener = tcp_listen(&device_port);
+    listener = tcp_listenOnFree(&device_port);
     start_without_client("tcp://127.0.0.1", device_port, options);
     for (unsigned i = 0; i < MANY; i++)
         fds[i] = tcp_connectTo(port);

@@ -187,7 +187,7 @@ TEST(an_address_that_never_answers_does_not_keep_the_link_from_the_next)
     tcp_peer *peer = tcp_peer_new();
 
     begin_tcp();
-    int listener = tcp_listen(&ports[0]);
+    int listener = tcp_listenOnFree(&ports[0]);
     assert_int_equal(listen(listener, 0), 0);
     int filler = tcp_connectTo(ports[0]);
     ports[1] = tcp_peer_start(peer, 0);

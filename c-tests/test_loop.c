@@ -156,7 +156,7 @@ TEST_WITH(a_client_that_gets_no_answer_ends_while_others_are_busy, begin, end)
 {
     device *silent = &devices[TCP_PEER_CONNECTIONS];
     uint16_t port;
-    int listener = tcp_listen(&port);
+    int listener = tcp_listenOnFree(&port);
 
     start_peers(1);
     begin_devices(TCP_PEER_CONNECTIONS, 1000000);

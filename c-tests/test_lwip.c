@@ -1,112 +1,264 @@
-/* The port for lwIP's raw API, client and server, over Debian's lwIP and a wire in memory: what
- * comes in other pieces than frames, and what lwIP or the network does not take. */
-#include "mbm_lwip.h"
-#include "lwip_wire.h"
+/* The port for lwIP's raw API, client and server, over Debian's lwIP and a wire in memory: bytes
+ * that come in other pieces than frames, and bytes that lwIP or the peer does not take. */
+#include "lwip_pair.h"
 #include "test.h"
 
-enum { PLACES = 3, REGISTERS = 125, PORT = 502 };
+#include "lwip/priv/tcp_priv.h"
 
-static uint16_t words[REGISTERS];
-static mbm_registerTable holding;
-static mbm_unit unit;
-static mbm_lwip_listener listener;
-static mbm_lwip places[PLACES];
-static mbm_server servers[PLACES];
-static uint8_t frames[PLACES][MBM_MAX_TCP_FRAME];
-
-static mbm_lwip device;
-static mbm_client client;
-static uint8_t incoming[MBM_MAX_TCP_FRAME], outgoing[MBM_MAX_TCP_FRAME];
-static uint16_t reply[REGISTERS];
-static mbm_clientRequest request;
-
-/* The main loop of a server. */
-static void serve(void)
-{
-    int i;
-
-    while ((i = mbm_lwip_accept(&listener)) >= 0) {
-        const mbm_port port = mbm_lwip_port(&places[i]);
-
-        OK(mbm_server_beginTcp(&servers[i], &port, &unit, 1, frames[i], sizeof frames[i]));
-    }
-    for (i = 0; i < PLACES; i++) {
-        if (mbm_lwip_isInUse(&places[i]) && mbm_server_poll(&servers[i]) != MBM_OK)
-            mbm_lwip_close(&places[i]);
-    }
-}
-
-static void serve_and_poll(void)
-{
-    serve();
-    (void)mbm_client_poll(&client);
-}
-
-static void setup(void)
-{
-    int i;
-
-    wire_begin();
-    memset(&holding, 0, sizeof holding);
-    memset(&unit, 0, sizeof unit);
-    memset(&listener, 0, sizeof listener);
-    memset(places, 0, sizeof places);
-    memset(servers, 0, sizeof servers);
-    memset(&device, 0, sizeof device);
-    memset(&client, 0, sizeof client);
-    memset(&request, 0, sizeof request);
-    for (i = 0; i < REGISTERS; i++)
-        words[i] = (uint16_t)(0x100 * i + 7);
-    holding.words = words;
-    holding.size = REGISTERS;
-    unit.id = 1;
-    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-    OK(mbm_lwip_listen(&listener, NULL, PORT, places, PLACES));
-}
-
-static void teardown(void)
-{
-    int i;
-
-    mbm_lwip_closeListener(&listener);
-    for (i = 0; i < PLACES; i++)
-        mbm_lwip_close(&places[i]);
-    mbm_lwip_close(&device);
-    wire_end();
-}
-
-fixture each_test = {setup, teardown};
-
-static void connect_client(void)
-{
-    const mbm_port port = mbm_lwip_port(&device);
-
-    IS(MBM_PENDING, mbm_lwip_open(&device, &the_wire.far, PORT));
-    OK(mbm_client_beginTcp(&client, &port, incoming, sizeof incoming, outgoing, sizeof outgoing));
-    wire_deliver();
-    OK(mbm_lwip_status(&device));
-}
-
-static void queue_read(uint16_t quantity)
-{
-    request.unit = 1;
-    request.reply = reply;
-    request.replyBytes = sizeof reply;
-    IS(MBM_PENDING, mbm_client_readHoldingRegisters(&client, &request, 0, quantity));
-}
-
-static void read_all(void)
-{
-    memset(reply, 0, sizeof reply);
-    queue_read(REGISTERS);
-    wire_pass(500, serve_and_poll);
-    IS(MBM_OK, request.status);
-    assert_memory_equal(reply, words, sizeof words);
-}
+fixture each_test = {pair_begin, pair_end};
 
 TEST(a_client_reads_what_a_server_has)
 {
-    connect_client();
-    read_all();
-    read_all();
+    client_connect();
+    client_reads();
+    client_reads();
+}
+
+/* Requests and responses too: the header of a packet, then a first and further pbufs. */
+TEST(a_chain_of_pbufs_may_be_split_at_every_byte)
+{
+    client_connect();
+    for (the_wire.first = 1; the_wire.first <= 259; the_wire.first++)
+        client_reads();
+    the_wire.first = 1;
+    for (the_wire.others = 1; the_wire.others <= 20; the_wire.others++)
+        client_reads();
+}
+
+TEST(two_requests_in_one_pbuf_are_both_answered)
+{
+    uint8_t both[2 * FRAME] = {0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 5,
+                               0, 2, 0, 0, 0, 6, 1, 3, 0, 0, 0, 5};
+
+    peer_connect(&peers[0]);
+    peer_send(&peers[0], both, sizeof both);
+    wire_pass(500, serve);
+    peer_expects(&peers[0], 1, 2, 5);
+}
+
+TEST(half_a_request_waits_for_its_rest)
+{
+    const uint8_t bytes[FRAME] = {0, 9, 0, 0, 0, 6, 1, 3, 0, 0, 0, 7};
+    uint16_t part;
+
+    peer_connect(&peers[0]);
+    for (part = 1; part < FRAME; part++) {
+        peers[0].count = 0;
+        peer_send(&peers[0], bytes, part);
+        wire_pass(500, serve);
+        assert_int_equal(peers[0].count, 0);
+        peer_send(&peers[0], bytes + part, (uint16_t)(FRAME - part));
+        wire_pass(500, serve);
+        peer_expects(&peers[0], 9, 1, 7);
+    }
+}
+
+TEST(a_request_that_is_cut_off_by_the_end_is_not_carried_out)
+{
+    const uint8_t bytes[FRAME] = {0, 9, 0, 0, 0, 6, 1, 6, 0, 0, 0xAA, 0xAA};
+
+    peer_connect(&peers[0]);
+    peer_send(&peers[0], bytes, FRAME - 1);
+    peer_close(&peers[0]);
+    wire_pass(500, serve);
+    assert_int_equal(words[0], 7);
+    assert_int_equal(ends, 1);
+    assert_false(mbm_lwip_isInUse(&places[0]));
+}
+
+TEST(a_write_that_lwip_has_no_memory_for_is_made_later)
+{
+    client_connect();
+    failing_writes = 5;
+    client_reads();
+    assert_int_equal(failing_writes, 0);
+    /* Nothing is sent twice: the server has seen one request, the client one response. */
+    assert_int_equal(writes, 7);
+}
+
+TEST(responses_leave_in_order_when_lwip_has_memory_only_now_and_then)
+{
+    uint16_t i;
+
+    peer_connect(&peers[0]);
+    for (i = 0; i < 30; i++)
+        peer_ask(&peers[0], i, 125);
+    for (i = 0; i < 200; i++) {
+        failing_writes = i % 3;
+        wire_pass(10, serve);
+    }
+    peer_expects(&peers[0], 0, 30, 125);
+}
+
+/* What a server does not read closes the window of its peer, and nothing is lost. */
+TEST(the_window_is_given_back_only_as_bytes_are_read)
+{
+    static uint8_t sent[0x18000], got[sizeof sent];
+    const mbm_port port = mbm_lwip_port(&places[0]);
+    uint32_t left = sizeof sent, i, at = 0;
+
+    for (i = 0; i < sizeof sent; i++)
+        sent[i] = (uint8_t)(i * 7 + (i >> 8));
+    peer_connect(&peers[0]);
+    assert_int_equal(mbm_lwip_accept(&listener), 0);
+    for (i = 0; i < 4000 && at < sizeof sent; i++) {
+        const uint16_t room = (uint16_t)LWIP_MIN(tcp_sndbuf(peers[0].pcb), left);
+
+        if (room > 0 && tcp_write(peers[0].pcb, sent + sizeof sent - left, room, 0) == ERR_OK)
+            left -= room;
+        tcp_output(peers[0].pcb);
+        wire_pass(50, NULL);
+        if (i == 100) {
+            /* Five seconds, and nothing was read. */
+            assert_int_equal(
+                places[0].pcb->rcv_wnd,
+                TCP_WND - places[0].received->tot_len -
+                    (places[0].pcb->refused_data ? places[0].pcb->refused_data->tot_len : 0));
+            assert_true(pbuf_clen(places[0].received) <= MBM_LWIP_PBUFS);
+        }
+        if (i >= 100) {
+            const int16_t count = port.read(port.context, got + at, 300);
+
+            assert_true(count >= 0);
+            at += (uint16_t)count;
+        }
+    }
+    assert_int_equal(at, sizeof sent);
+    assert_memory_equal(got, sent, sizeof sent);
+}
+
+TEST(small_segments_take_a_bounded_number_of_pbufs)
+{
+    uint16_t i;
+
+    peer_connect(&peers[0]);
+    wire_pass(50, serve);
+    for (i = 0; i < 100; i++) {
+        peer_ask(&peers[0], i, 2);
+        wire_deliver();
+    }
+    assert_int_equal(pbuf_clen(places[0].received), MBM_LWIP_PBUFS);
+    wire_pass(30000, serve);
+    peer_expects(&peers[0], 0, 100, 2);
+}
+
+/* More than both windows and both buffers hold. */
+TEST(responses_to_a_peer_that_reads_late_are_all_sent)
+{
+    uint16_t i;
+
+    peer_connect(&peers[0]);
+    peers[0].isDeaf = 1;
+    for (i = 0; i < 450; i++) {
+        peer_ask(&peers[0], i, 125);
+        wire_pass(10, serve);
+    }
+    assert_true(peers[0].count < 0x10000);
+    tcp_recved(peers[0].pcb, (u16_t)peers[0].count);
+    peers[0].isDeaf = 0;
+    wire_pass(20000, serve);
+    peer_expects(&peers[0], 0, 450, 125);
+}
+
+TEST(a_peer_that_never_reads_is_given_up_and_harms_no_other)
+{
+    uint16_t i;
+
+    peer_connect(&peers[0]);
+    peers[0].isDeaf = 1;
+    client_connect();
+    for (i = 0; i < 800 && peers[0].pcb; i++) {
+        if (tcp_sndqueuelen(peers[0].pcb) < 100)
+            peer_ask(&peers[0], i, 125);
+        wire_pass(10, serve);
+    }
+    client_reads();
+    assert_true(mbm_lwip_isInUse(&places[0]));
+    wire_pass(MBM_LWIP_UNACKNOWLEDGED_MS + 1000, serve);
+    assert_false(mbm_lwip_isInUse(&places[0]));
+    peer_ask(&peers[0], 0, 1);
+    wire_pass(500, serve);
+    assert_int_equal(peers[0].error, ERR_RST);
+    client_reads();
+}
+
+TEST(a_peer_that_says_it_sends_no_more_still_gets_its_response)
+{
+    peer_connect(&peers[0]);
+    peer_ask(&peers[0], 3, 4);
+    assert_int_equal(tcp_shutdown(peers[0].pcb, 0, 1), ERR_OK);
+    wire_pass(500, serve);
+    peer_expects(&peers[0], 3, 1, 4);
+    assert_true(peers[0].isEnded);
+    assert_int_equal(ends, 1);
+}
+
+TEST(a_response_that_was_written_before_close_still_leaves)
+{
+    const mbm_port port = mbm_lwip_port(&places[0]);
+
+    peer_connect(&peers[0]);
+    assert_int_equal(mbm_lwip_accept(&listener), 0);
+    assert_int_equal(port.write(port.context, (const uint8_t *)"12345", 5), 5);
+    mbm_lwip_close(&places[0]);
+    wire_pass(500, NULL);
+    assert_int_equal(peers[0].count, 5);
+    assert_true(peers[0].isEnded);
+}
+
+TEST(bytes_that_came_before_a_reset_can_be_read)
+{
+    const mbm_port port = mbm_lwip_port(&places[0]);
+    uint8_t bytes[10];
+
+    peer_connect(&peers[0]);
+    assert_int_equal(mbm_lwip_accept(&listener), 0);
+    peer_send(&peers[0], "12345", 5);
+    wire_deliver();
+    peer_reset(&peers[0]);
+    wire_deliver();
+    assert_int_equal(port.read(port.context, bytes, 3), 3);
+    assert_int_equal(port.read(port.context, bytes + 3, 7), 2);
+    assert_memory_equal(bytes, "12345", 5);
+    assert_int_equal(port.read(port.context, bytes, 10), -1);
+    assert_int_equal(places[0].error, ERR_RST);
+}
+
+TEST(several_clients_get_each_its_own_answers)
+{
+    uint16_t i, j;
+
+    for (j = 0; j < PLACES; j++)
+        peer_connect(&peers[j]);
+    for (i = 0; i < 50; i++) {
+        for (j = 0; j < PLACES; j++)
+            peer_ask(&peers[j], (uint16_t)(1000 * j + i), (uint8_t)(j + 1));
+        wire_pass(20, serve);
+    }
+    for (j = 0; j < PLACES; j++)
+        peer_expects(&peers[j], (uint16_t)(1000 * j), 50, (uint8_t)(j + 1));
+}
+
+TEST(twenty_thousand_requests_and_ten_resets)
+{
+    static mbm_link kept;
+    const mbm_linkHooks hooks = mbm_lwip_link(&device);
+    uint32_t resets = 0, i;
+
+    client_start();
+    IS(MBM_PENDING, mbm_lwip_open(&device, &the_wire.far, PORT));
+    memset(&kept, 0, sizeof kept);
+    OK(mbm_link_begin(&kept, &client, &hooks));
+    OK(mbm_link_setRequestsWait(&kept, 1));
+    for (i = 0; i < 20000; i++) {
+        client_reads();
+        if (i % 2000 == 1000) {
+            int j;
+
+            for (j = 0; j < PLACES; j++)
+                mbm_lwip_disconnect(&places[j]);
+            resets++;
+        }
+    }
+    assert_int_equal(resets, 10);
 }

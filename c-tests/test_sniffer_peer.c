@@ -201,7 +201,7 @@ static void over_tcp(uint8_t apart)
 
     tcp_server_start(&device);
     int to_server = tcp_connectTo(device.port);
-    int proxy = tcp_listen(&port);
+    int proxy = tcp_listenOnFree(&port);
     modbus_t *client = modbus_new_tcp("127.0.0.1", port);
     modbus_set_slave(client, 17);
     assert_int_equal(modbus_connect(client), 0);

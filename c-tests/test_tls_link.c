@@ -206,7 +206,7 @@ TEST(a_peer_that_never_answers_is_a_timeout_of_the_connection)
     mbm_tls_identity who = {0};
     uint16_t at;
 
-    int silent = tcp_listen(&at);
+    int silent = tcp_listenOnFree(&at);
     tls_identify(&who, "operator", "authority", 0);
     who.handshakeUs = 20000;
     keep(&l, &who, at);

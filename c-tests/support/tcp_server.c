@@ -10,7 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-int tcp_listen(uint16_t *port)
+int tcp_listenOnFree(uint16_t *port)
 {
     struct sockaddr_in at;
     socklen_t length = sizeof at;
@@ -97,7 +97,7 @@ static void *serve(void *argument)
 
 void tcp_server_start(tcp_server *s)
 {
-    s->listener = tcp_listen(&s->port);
+    s->listener = tcp_listenOnFree(&s->port);
     s->peer = modbus_new_tcp("127.0.0.1", s->port);
     s->mapping = server_memory();
     if (!s->peer || pipe(s->stop)) {

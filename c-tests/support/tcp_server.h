@@ -20,9 +20,9 @@ typedef struct tcp_server {
 void tcp_server_start(tcp_server *s);
 void tcp_server_stop(tcp_server *s);
 
-/* tcp_listen makes a socket that listens on a free port of this machine; tcp_connectTo makes
+/* tcp_listenOnFree makes a socket that listens on a free port of this machine; tcp_connectTo makes
  * one that is connected to such a port. */
-int tcp_listen(uint16_t *port);
+int tcp_listenOnFree(uint16_t *port);
 int tcp_connectTo(uint16_t port);
 
 /* Makes a socket that reserves a free port for listeners with SO_REUSEADDR: no other

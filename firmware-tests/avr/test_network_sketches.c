@@ -114,7 +114,7 @@ static void to_client(wire *w, const uint8_t *frame, size_t length)
 static int gets(board *b, wire *network, int (*work)(modbus_t *peer))
 {
     task t = {.work = work, .result = -2};
-    int listener = tcp_listen(&t.port), fd;
+    int listener = tcp_listenOnFree(&t.port), fd;
 
     assert_int_equal(pthread_create(&t.thread, NULL, run, &t), 0);
     fd = accept(listener, NULL, NULL);

@@ -15,6 +15,9 @@ enum { IDLE_MS = 15000, PROBE_INTERVAL_MS = 5000, PROBE_COUNT = 3 };
 /* The most bytes that one read or write moves, since its result is an int16_t. */
 enum { MOST = 0x7FFF };
 
+/* The most received bytes that are copied to lwIP's heap: several requests. */
+enum { MOST_JOINED = 1024 };
+
 /* --- the end of a connection */
 
 static void free_received(mbm_lwip *link)
@@ -84,9 +87,17 @@ static err_t report(mbm_lwip *link, struct tcp_pcb *pcb)
     return result;
 }
 
-static u16_t pbufs_of(const struct pbuf *p)
+/* Returns whether there is place for more bytes. Many small segments are joined, so that their
+ * pbufs are free. */
+static uint8_t has_place_for(mbm_lwip *link, const struct pbuf *more)
 {
-    return p != NULL ? pbuf_clen(p) : 0;
+    const struct pbuf *held = link->received;
+
+    if ((u32_t)held->tot_len + more->tot_len > 0xFFFF)
+        return 0;
+    if (pbuf_clen(held) + pbuf_clen(more) > MBM_LWIP_PBUFS && held->tot_len <= MOST_JOINED)
+        held = link->received = pbuf_coalesce(link->received, PBUF_RAW);
+    return pbuf_clen(held) == 1 || pbuf_clen(held) + pbuf_clen(more) <= MBM_LWIP_PBUFS;
 }
 
 static err_t on_received(void *context, struct tcp_pcb *pcb, struct pbuf *p, err_t error)
@@ -94,17 +105,14 @@ static err_t on_received(void *context, struct tcp_pcb *pcb, struct pbuf *p, err
     mbm_lwip *link = context;
 
     (void)error;
-    if (p == NULL) {
+    if (p == NULL)
         link->flags |= MBM_LWIP_IS_ENDED;
-    } else if (link->received == NULL) {
+    else if (link->received == NULL)
         link->received = p;
-    } else if (pbufs_of(link->received) + pbufs_of(p) > MBM_LWIP_PBUFS ||
-               (u32_t)link->received->tot_len + p->tot_len > 0xFFFF) {
-        /* lwIP keeps it, tries again, and drops what comes after it. */
-        return ERR_MEM;
-    } else {
+    else if (has_place_for(link, p))
         pbuf_cat(link->received, p);
-    }
+    else
+        return ERR_MEM; /* lwIP keeps it, tries again, and drops what comes after it */
     return report(link, pcb);
 }
 
@@ -424,7 +432,7 @@ static int16_t lwip_write(void *context, const uint8_t *bytes, uint16_t length)
     int16_t count = 0;
 
     MBM_LWIP_TAKE(link);
-    if (link->flags & MBM_LWIP_IS_SUCCESSOR || link->state == MBM_LWIP_LOST) {
+    if (link->flags & MBM_LWIP_IS_SUCCESSOR || link->pcb == NULL) {
         count = -1;
     } else if (link->state == MBM_LWIP_CONNECTED && !(link->flags & MBM_LWIP_IS_NEW) &&
                length > 0) {

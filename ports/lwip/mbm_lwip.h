@@ -214,7 +214,7 @@ uint8_t mbm_lwip_listen(mbm_lwip_listener *listener, const ip_addr_t *address, u
  */
 int mbm_lwip_accept(mbm_lwip_listener *listener);
 
-/** Stops listening. Connections that were handed over stay; the others are reset. */
+/** Stops listening. Connections that were handed over stay; the others are closed. */
 void mbm_lwip_closeListener(mbm_lwip_listener *listener);
 
 /* --- between the files of the port */
