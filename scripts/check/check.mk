@@ -34,7 +34,7 @@ compile-commands: export AS_DATABASE := $(AS_DATABASE)
 .PHONY: compile-commands
 compile-commands: ## Write compile_commands.json, for editors and clang-tidy
 	@scripts/need gcc g++ libc6-dev pkg-config libmodbus-dev libcmocka-dev libmbedtls-dev openssl valgrind libmosquitto-dev libcjson-dev libyaml-dev \
-		libsimavr-dev libelf-dev
+		libsimavr-dev libelf-dev liblwip-dev
 	@$(MAKE) --no-print-directory print-commands | awk "$$AS_DATABASE" >compile_commands.json.new
 	@mv compile_commands.json.new compile_commands.json
 	@echo "compile-commands: $$(grep -c '"file"' compile_commands.json) files in compile_commands.json"
