@@ -60,17 +60,24 @@ help: ## List the targets
 archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm.a
 	@echo "archive: $(ARCHIVE), by $$(cat $(dir $(ARCHIVE))compiler)"
 
+# What the packages for users need. Each target looks for all of it before it builds anything.
+LINUX_NEEDS = rust gcc libc6-dev binutils pkg-config libmbedtls-dev
+TOOL_NEEDS = $(LINUX_NEEDS) help2man libcjson-dev libyaml-dev libmosquitto-dev
+DEBIAN_NEEDS = $(TOOL_NEEDS) dpkg-dev
+
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(SANITIZED_ARCHIVE)
 $(ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive --host $@
+	+@CARGO="$(CARGO)" scripts/build/archive --host $@
 $(SANITIZED_ARCHIVE):
 	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
 # The library for Linux: the archive with the ports of ports/linux, and libmbm-tls.a.
 LIBRARY := $(BUILD)/linux/libmbm.a
 .PHONY: linux
-linux: $(ARCHIVE) ## Build the library for Linux on this machine with its ports, build/linux
+linux: ## Build the library for Linux on this machine with its ports, build/linux
+	@scripts/need $(LINUX_NEEDS)
+	@$(MAKE) --no-print-directory $(ARCHIVE)
 	@scripts/build/ports $(ARCHIVE) $(dir $(LIBRARY))
 	@echo "linux: $(LIBRARY), and for TLS libmbm-tls.a"
 
@@ -83,8 +90,13 @@ archives: ## Build the archives for microcontrollers, build/archives
 	@scripts/check/stack >build/stack.txt && tail -n 1 build/stack.txt
 
 .PHONY: install
-install: linux ## Install the library with its ports, and files for pkg-config and CMake, below PREFIX
-	@PREFIX="$(PREFIX)" LIBDIR="$(LIBDIR)" DESTDIR="$(DESTDIR)" scripts/build/install
+install: export PREFIX := $(PREFIX)
+install: export LIBDIR := $(LIBDIR)
+install: export DESTDIR := $(DESTDIR)
+install: ## Install the library with its ports, and files for pkg-config and CMake, below PREFIX
+	@scripts/build/install --check
+	@$(MAKE) --no-print-directory linux
+	@scripts/build/install
 
 .PHONY: check-install
 check-install: tool ## Install, and build and run the README's program from there
@@ -255,7 +267,7 @@ need-test:
 
 # With each object the compiler writes a list of the headers that it includes.
 DEPENDS := -MMD -MP
-OBJECTS := $(wildcard $(foreach folder,plain sanitized coverage aarch64 bench avr-tests,$(addprefix $(BUILD)/$(folder)/,*.o */*.o)))
+OBJECTS := $(wildcard $(foreach folder,plain sanitized coverage aarch64 bench avr-tests linux,$(addprefix $(BUILD)/$(folder)/,*.o */*.o)))
 -include $(wildcard $(OBJECTS:.o=.d))
 # An object without its list is compiled again.
 .PHONY: without-list
@@ -398,27 +410,35 @@ $(PEERS): $(patsubst %,$(BUILD)/plain/%.o,serve_libmodbus support/server support
 
 .PHONY: tool
 tool: ## Build the command line tool, build/plain/mbm
-	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
+	@scripts/need $(filter-out help2man,$(TOOL_NEEDS))
 	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
 	@echo "tool: $(BUILD)/plain/mbm"
 
 # The tool as it is installed: optimised and hardened, over the library of the ports.
 INSTALLED_TOOL := $(BUILD)/linux/mbm
-HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE -pie -Wl,-z,relro,-z,now,--as-needed
-$(INSTALLED_TOOL): linux $(TOOL) $(wildcard cli/*.h) cli/page.html
-	@scripts/need gcc libc6-dev libmbedtls-dev libcjson-dev libyaml-dev libmosquitto-dev
-	@gcc -std=c11 $(HARDENED) $(TOOL_FLAGS) -Iinclude -Iports/linux $(TOOL) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
+HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE
+$(BUILD)/linux/cli/%.o: cli/%.c
+	@mkdir -p $(@D)
+	@gcc $(DEPENDS) -std=c11 $(HARDENED) $(TOOL_FLAGS) -Iinclude -Iports/linux -c $< -o $@
+$(BUILD)/linux/cli/page.o: cli/page.html
+$(INSTALLED_TOOL): linux $(TOOL:%.c=$(BUILD)/linux/%.o)
+	@gcc -pie -Wl,-z,relro,-z,now,--as-needed $(filter %.o,$^) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
+
+# That tool with its man pages.
+.PHONY: tool-parts
+tool-parts:
+	@scripts/need $(TOOL_NEEDS)
+	@[ -f $(INSTALLED_TOOL) ] || echo "tool: compiles $(words $(TOOL)) files in C and the library"
+	@$(MAKE) --no-print-directory -j$$(nproc) $(INSTALLED_TOOL)
+	@cli/man $(INSTALLED_TOOL) $(BUILD)/man
 
 .PHONY: install-tool
-install-tool: $(INSTALLED_TOOL) man ## Install that tool, its man pages, completion, units of systemd and examples below PREFIX
-	@install -D -m 755 $(INSTALLED_TOOL) "$(DESTDIR)$(or $(PREFIX),/usr/local)/bin/mbm"
-	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/man/man1" $(BUILD)/man/*.1
-	@install -D -m 644 cli/completion/mbm.bash "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/bash-completion/completions/mbm"
-	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/zsh/vendor-completions" cli/completion/_mbm
-	@packaging/systemd/write "$(or $(PREFIX),/usr/local)/bin" "$(DESTDIR)$(or $(PREFIX),/usr/local)/lib/systemd/system"
-	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/doc/mbm/examples/services" examples/services/*.yaml
-	@install -D -m 644 -t "$(DESTDIR)$(or $(PREFIX),/usr/local)/share/doc/mbm/examples/devices" examples/devices/*.yaml
-	@echo "install-tool: mbm $$(scripts/version) is in $(DESTDIR)$(or $(PREFIX),/usr/local)/bin"
+install-tool: export PREFIX := $(PREFIX)
+install-tool: export DESTDIR := $(DESTDIR)
+install-tool: ## Install that tool, its man pages, completion, units of systemd and examples below PREFIX
+	@scripts/build/install-tool --check
+	@$(MAKE) --no-print-directory tool-parts
+	@scripts/build/install-tool
 
 .PHONY: man
 man: tool ## Make the man pages of that tool, build/man

@@ -11,20 +11,19 @@ $(MCU_BUILDS): build-archive-%:
 # Missing packages are installed or named before the first build.
 .PHONY: need-packages
 need-packages:
-	@scripts/need gcc libc6-dev libmbedtls-dev gcc-aarch64-linux-gnu libc6-dev-arm64-cross dpkg-dev
-	@scripts/build/archive --packages $(MCUS) atmega4809
+	@scripts/build/archive --packages $(MCUS) atmega4809 -- $(DEBIAN_NEEDS) python3 gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 
 # The parts of an SDK for some boards alone: theirs, and the library for this machine.
 .PHONY: sdk-parts
 sdk-parts:
-	@scripts/need gcc libc6-dev libmbedtls-dev
-	@archives=$$(MBM_BOARDS="$(BOARDS)" scripts/build/boards.py --archives) && scripts/build/archive --packages $$archives && \
+	@archives=$$(MBM_BOARDS="$(BOARDS)" scripts/build/boards.py --archives) && \
+		scripts/build/archive --packages $$archives -- $(LINUX_NEEDS) && \
 		$(MAKE) --no-print-directory -j$$(nproc) linux assembler $$(printf 'build-archive-%s ' $$archives)
 
 .PHONY: dist-parts
 dist-parts: need-packages $(ARCHIVE)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(MCU_BUILDS)
-	@$(MAKE) --no-print-directory assembler $(INSTALLED_TOOL) man archive-aarch64
+	@$(MAKE) --no-print-directory assembler tool-parts archive-aarch64
 
 .PHONY: dist
 dist: dist-parts ## Write all packages to dist/, with their SHA-256 sums; builds what they contain
@@ -33,7 +32,7 @@ dist: dist-parts ## Write all packages to dist/, with their SHA-256 sums; builds
 # The contents of the package of each kind. The crates and the source have what is in the clone.
 PARTS_arduino := assembler
 PARTS_crates :=
-PARTS_debian := $(ARCHIVE) linux $(INSTALLED_TOOL) man
+PARTS_debian := tool-parts
 PARTS_esp-idf := assembler BOARDS="riscv esp32"
 PARTS_platformio := $(ARCHIVE) assembler
 PARTS_rt-thread := assembler BOARDS="arm riscv"
@@ -41,11 +40,17 @@ PARTS_sbom := $(ARCHIVE)
 PARTS_sdk = $(if $(BOARDS),sdk-parts,dist-parts)
 PARTS_source :=
 PARTS_zephyr := assembler BOARDS="arm riscv"
+# What the scripts of each kind need themselves, beside its parts.
+NEEDS_crates = rust python3
+NEEDS_debian = $(DEBIAN_NEEDS)
+NEEDS_platformio = rust gcc libc6-dev python3
+NEEDS_sbom = rust gcc libc6-dev python3
 KIND ?=
 PACKAGE_KINDS := $(patsubst packaging/%/pack,%,$(wildcard packaging/*/pack))
 .PHONY: package
 package: ## Write the packages of one kind to dist/, KIND=arduino, crates, debian, esp-idf, platformio, rt-thread, sdk or zephyr
 	@[ -n "$(filter $(KIND),$(PACKAGE_KINDS))" ] || { echo "package: KIND is one of $(PACKAGE_KINDS)" >&2; exit 1; }
+	@scripts/need $(or $(NEEDS_$(KIND)),python3)
 	@$(if $(PARTS_$(KIND)),$(MAKE) --no-print-directory $(PARTS_$(KIND)))
 	@mkdir -p dist
 	@MBM_BOARDS="$(BOARDS)" packaging/$(KIND)/pack dist
@@ -61,6 +66,7 @@ deb: ## Write the Debian packages of this machine to dist/: mbm, libmbm0 and lib
 BOARD ?=
 PARTS ?=
 single: ## Write mbm.h and mbm.S, the library for BOARD in two files, to dist/single; PARTS="master ring": these headers alone
+	@scripts/need python3
 	@[ "$(BOARD)" ] || { echo "single: BOARD is one of $$(scripts/build/boards.py --list)" >&2; exit 1; }
 	@$(MAKE) --no-print-directory assembler BOARDS="$(BOARD)"
 	@scripts/build/single $(BOARD) dist/single/$$(echo $(BOARD) $(PARTS) | tr " " -) $(PARTS)

@@ -10,6 +10,7 @@ boards and archives, such as "uno cortex-m4"; all if it is empty.
 import difflib
 import os
 import pathlib
+import re
 import subprocess
 import sys
 from typing import NamedTuple
@@ -69,24 +70,30 @@ FAMILIES = {
     "esp8266": (("xtensa",), ["esp8266"]),
     # Some of them are RISC-V.
     "esp32": (("bytes", "riscv"), ["esp32"]),
+    "nucleo": (("arm",), ["stm32"]),
+    "teensy": (("arm",), ["teensy"]),
 }
 
 # Boards and series of chips, by the archive for their processor.
 BOARDS = {
-    "atmega328p": "uno nano pro-mini",
-    "atmega32u4": "leonardo micro",
-    "atmega2560": "mega",
+    "atmega328p": "uno uno-r3 nano pro-mini atmega328",
+    "atmega32u4": "leonardo micro pro-micro",
+    "atmega2560": "mega mega2560",
     "atmega4809": "nano-every uno-wifi-r2",
     "cortex-m0": "microbit stm32f0",
-    "cortex-m0plus": "pico rp2040 zero mkr stm32g0 stm32l0 teensy-lc",
-    "cortex-m3": "bluepill due stm32f1",
-    "cortex-m4": "blackpill uno-r4 nano-33-ble microbit-v2 nrf52 samd51 stm32f3 stm32f4 stm32g4 stm32l4 teensy3",
+    "cortex-m0plus": "pico pico-w rp2040 zero mkr nano-33-iot samd21 stm32c0 stm32g0 stm32l0 teensy-lc",
+    "cortex-m3": "bluepill due stm32f1 stm32f2 stm32l1",
+    "cortex-m4": "blackpill uno-r4 nano-33-ble microbit-v2 nrf52 samd51 stm32f3 stm32f4 stm32g4 stm32l4 stm32wb stm32wl teensy3",
     "cortex-m7": "giga portenta stm32f7 stm32h7 teensy4",
-    "cortex-m33": "pico2 rp2350 stm32h5 stm32u5",
-    "esp32": "esp32s2 esp32s3",
+    "cortex-m33": "pico2 pico2-w rp2350 stm32h5 stm32l5 stm32u5 stm32wba",
+    "esp32": "esp32dev esp32s2 esp32s3 nano-esp32",
+    "esp32c3": "esp32c2",
     "esp32c6": "esp32c5 esp32h2",
-    "esp8266": "nodemcu d1-mini",
+    "esp8266": "nodemcu d1-mini wemos",
 }
+
+# Names of a board or chip of these makers begin with one of BOARDS: that of a nucleo-f401re is stm32f4.
+SERIES = re.compile(r"(?:nucleo|stm32)(wba|[a-z][0-9bl])|(atmega\d+|teensy\d|esp32[chs]\d)")
 
 
 # The archive that a C project takes for the processor of another one, as packaging/sdk/target.h says.
@@ -111,13 +118,22 @@ def archives() -> list:
 
 def plain(name: str) -> str:
     """A name without what people write differently: ESP32-C3 is esp32c3."""
-    return name.lower().replace("-", "").replace("_", "")
+    return re.sub(r"[-_. ]|^arduino", "", name.lower())
+
+
+def known(name: str) -> str | None:
+    """The one of names() for a board, a chip or a family as people call it; None if there is none."""
+    by_name = {plain(one): one for one in names()}
+    word = plain(name)
+    if series := SERIES.match(word):
+        return by_name.get(word) or by_name.get(f"stm32{series[1]}" if series[1] else series[2])
+    return by_name.get(word)
 
 
 def archive_of(board: str) -> str | None:
     """The archive for a board, which may be named by its archive itself; None if there is no such board."""
-    return next((archive for archive in archives() for name in [archive, *BOARDS.get(archive, "").split()]
-                 if plain(name) == plain(board)), None)
+    name = known(board)
+    return next((archive for archive in archives() if name in [archive, *BOARDS.get(archive, "").split()]), None)
 
 
 def names() -> list:
@@ -127,19 +143,19 @@ def names() -> list:
 
 
 def refuse(name: str) -> None:
-    near = difflib.get_close_matches(name.lower(), names(), 3)
+    by_name = {plain(one): one for one in names()}
+    near = [by_name[word] for word in difflib.get_close_matches(plain(name), by_name, 3)]
     hint = f"; the nearest names are {', '.join(near)}" if near else ""
     sys.exit(f"boards: there is no board or family \"{name}\"{hint}. `scripts/build/boards.py --list` prints all names")
 
 
 def named() -> list:
     """What MBM_BOARDS names. Ends the program if it does not know one of the names."""
-    known = {plain(name): name for name in names()}
-    words = os.environ.get("MBM_BOARDS", "").split()
+    words = os.environ.get("MBM_BOARDS", "").replace(",", " ").split()
     for word in words:
-        if plain(word) not in known:
+        if not known(word):
             refuse(word)
-    return [known[plain(word)] for word in words]
+    return [known(word) for word in words]
 
 
 def set_names(word: str) -> list:

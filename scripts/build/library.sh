@@ -1,5 +1,22 @@
-# The files of the library for C, its templates, and tarballs. scripts/build/install and packaging/*/pack
-# source this file in the top folder.
+# The files of the library for C, its templates, tarballs, and who may install. scripts/build/install* and
+# packaging/*/pack source this file in the top folder.
+
+# as_owner NAME [--check]: returns if this user may write below $DESTDIR$PREFIX. Otherwise sudo runs this script again,
+# scripts/build/NAME; with --check it only says so, before anything is built. Without sudo, and with MBM_INSTALL=no, it
+# says what to do, and fails
+as_owner() {
+    below=$DESTDIR$PREFIX
+    while [ ! -e "$below" ]; do below=$(dirname "$below"); done
+    [ ! -w "$below" ] || [ ! -x "$below" ] || return 0
+    if [ "${MBM_INSTALL:-}" = no ] || ! command -v sudo >/dev/null; then
+        echo "$1: you may not write to $below. PREFIX=\$HOME/.local installs for you alone; root may say: make $1" >&2
+        exit 1
+    elif [ "${2:-}" ]; then
+        echo "$1: $below is not yours, so sudo installs there in the end. PREFIX=\$HOME/.local installs for you alone"
+    else
+        exec sudo env "PREFIX=$PREFIX" "LIBDIR=${LIBDIR:-}" "DESTDIR=$DESTDIR" "PATH=$PATH" "scripts/build/$1"
+    fi
+}
 
 # fill TEMPLATE OUTPUT: replaces the placeholders of a template by these variables of the shell:
 #   prefix          the folder of the library, as pkg-config sees it

@@ -356,6 +356,26 @@ class Boards(unittest.TestCase):
         with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "ESP32-C3 Nano_Every"}):
             self.assertEqual(boards.named(), ["esp32c3", "nano-every"])
 
+    def test_boards_and_families_have_the_names_that_people_use(self):
+        for name, board, archive in (
+            ("Uno", "uno", "atmega328p"), ("arduino-mega", "mega", "atmega2560"), ("leonardo", "leonardo", "atmega32u4"),
+            ("ESP32", "esp32", "esp32"), ("ESP32-C3", "esp32c3", "esp32c3"), ("esp32-s3-devkitc", "esp32s3", "esp32"),
+            ("Pico", "pico", "cortex-m0plus"), ("Blue-Pill", "bluepill", "cortex-m3"), ("blackpill", "blackpill", "cortex-m4"),
+            ("nucleo-f401re", "stm32f4", "cortex-m4"), ("NUCLEO_G071RB", "stm32g0", "cortex-m0plus"), ("stm32f103c8", "stm32f1", "cortex-m3"),
+            ("stm32wba52", "stm32wba", "cortex-m33"), ("teensy4.1", "teensy4", "cortex-m7"), ("teensyLC", "teensy-lc", "cortex-m0plus"),
+            ("atmega328pb", "atmega328", "atmega328p"), ("nucleo", "nucleo", None), ("teensy", "teensy", None),
+        ):
+            with self.subTest(name):
+                self.assertEqual((boards.known(name), boards.archive_of(name)), (board, archive))
+
+    def test_no_two_boards_have_the_same_plain_name(self):
+        plain = [boards.plain(name) for name in boards.names()]
+        self.assertEqual(len(plain), len(set(plain)))
+
+    def test_boards_may_stand_between_commas(self):
+        with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "uno,pico, mega"}):
+            self.assertEqual(boards.named(), ["uno", "pico", "mega"])
+
     def test_a_family_has_the_cores_of_arduino_that_it_names_and_a_board_those_of_its_instruction_set(self):
         with unittest.mock.patch.dict(os.environ, {"MBM_BOARDS": "esp32"}):
             self.assertEqual(boards.architectures(), ["esp32"])
@@ -371,6 +391,98 @@ class Boards(unittest.TestCase):
     def test_a_board_that_is_not_there_is_refused_with_the_nearest_names(self):
         with self.assertRaisesRegex(SystemExit, 'there is no board or family "unno"; the nearest names are uno'):
             self.kinds("unno")
+
+
+# --- what a new machine lacks
+
+
+class Need(unittest.TestCase):
+    """Runs scripts/need on a machine that has the packages `present`, and the Cargo of a test."""
+
+    def need(self, *packages, present=(), cargo="no-cargo", install="no"):
+        with tempfile.TemporaryDirectory() as folder:
+            program(pathlib.Path(folder) / "dpkg-query", f"case ' {' '.join(present)} ' in *\" $4 \"*) echo install ok installed ;; *) exit 1 ;; esac")
+            program(pathlib.Path(folder) / "sudo", "exit 0")
+            for version in ("1.95.0", "1.65.0"):
+                program(pathlib.Path(folder) / f"cargo-{version}", f"echo 'cargo {version} (abc 2026-01-01)'")
+            for name in ("apt-get", "flock"):
+                program(pathlib.Path(folder) / name, f"echo {name} \"$*\"", "exit 3")
+            return subprocess.run([ROOT / "scripts/need", *packages], capture_output=True, text=True, env={
+                "PATH": f"{folder}:/usr/bin:/bin", "CARGO": cargo, "MBM_INSTALL": install})
+
+    def test_without_rust_the_one_of_debian_is_named_beside_the_other_packages(self):
+        found = self.need("rust", "gcc", "help2man", present=["gcc"])
+        self.assertEqual(found.returncode, 1)
+        self.assertIn("Debian packages are missing: rustc-web cargo-web help2man\n", found.stderr)
+
+    def test_a_rust_that_is_new_enough_needs_no_package(self):
+        found = self.need("rust", "gcc", present=["gcc"], cargo="cargo-1.95.0")
+        self.assertEqual((found.returncode, found.stderr), (0, ""))
+
+    def test_an_old_rust_is_named_with_what_makes_it_newer(self):
+        found = self.need("rust", "gcc", present=["gcc"], cargo="cargo-1.65.0")
+        self.assertEqual(found.returncode, 1)
+        self.assertRegex(found.stderr, r"Rust 1.88 or later is needed, but .*cargo-1.65.0 --version says: cargo 1.65.0 .*`rustup update`")
+
+    def test_packages_of_debian_that_are_in_the_way_are_not_removed_but_named(self):
+        found = self.need("rust", present=["rustc", "cargo"], install="")
+        self.assertEqual(found.returncode, 1)
+        self.assertIn("apt-get remove rustc cargo\n", found.stderr)
+        self.assertNotIn("apt-get update", found.stderr)
+
+    def test_the_packages_that_a_caller_adds_are_named_in_the_same_sentence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program(pathlib.Path(folder) / "dpkg-query", "exit 1")
+            found = subprocess.run([ROOT / "scripts/build/archive", "--packages", "atmega328p", "cortex-m4", "--", "pkg-config"],
+                                   env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "MBM_INSTALL": "no", "MBM_RUST": ""},
+                                   capture_output=True, text=True)
+            self.assertIn("missing: binutils-arm-none-eabi binutils-avr cargo-web pkg-config rust-web-src rustc-web\n", found.stderr)
+
+
+class Owner(unittest.TestCase):
+    """Runs scripts/build/install and install-tool as a user who may not write to PREFIX."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.root.chmod(0o755)
+        for script in ("install", "install-tool", "library.sh"):
+            (self.root / "scripts/build").mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / "scripts/build" / script, self.root / "scripts/build")
+        self.prefix = self.root / "prefix"
+        self.prefix.mkdir()
+        self.prefix.chmod(0o555)
+        for tool in ("sh", "dirname", "env"):
+            (self.root / "path").mkdir(exist_ok=True)
+            (self.root / "path" / tool).symlink_to(shutil.which(tool))
+        self.nobody = {"user": 65534, "group": 65534, "extra_groups": []} if os.geteuid() == 0 else {}
+
+    def install(self, script, *arguments, **more):
+        return subprocess.run(["/bin/sh", self.root / "scripts/build" / script, *arguments], capture_output=True, text=True, **self.nobody,
+                              env={"PATH": str(self.root / "path"), "PREFIX": str(self.prefix), **more})
+
+    def test_sudo_installs_where_the_user_may_not(self):
+        program(self.root / "path/sudo", 'echo "sudo $*"')
+        for script in ("install", "install-tool"):
+            checked = self.install(script, "--check")
+            self.assertEqual(checked.returncode, 0)
+            self.assertIn(f"{script}: {self.prefix} is not yours, so sudo installs there in the end. PREFIX=$HOME/.local", checked.stdout)
+            installed = self.install(script)
+            self.assertRegex(installed.stdout, f"^sudo env PREFIX={self.prefix} .*scripts/build/{script}\n$")
+
+    def test_without_sudo_a_user_learns_where_to_install_before_anything_is_built(self):
+        for more in ({}, {"MBM_INSTALL": "no"}):
+            if more:
+                program(self.root / "path/sudo", "echo called")
+            checked = self.install("install-tool", "--check", **more)
+            self.assertEqual((checked.returncode, checked.stdout), (1, ""))
+            self.assertIn(f"you may not write to {self.prefix}. PREFIX=$HOME/.local installs for you alone", checked.stderr)
+
+    def test_a_folder_of_the_user_needs_no_sudo(self):
+        self.prefix.chmod(0o777)
+        checked = self.install("install", "--check")
+        self.assertEqual((checked.returncode, checked.stdout, checked.stderr), (0, "", ""))
 
 
 # --- the SBOM
