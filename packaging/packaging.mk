@@ -67,9 +67,23 @@ BOARD ?=
 PARTS ?=
 single: ## Write mbm.h and mbm.S, the library for BOARD in two files, to dist/single; PARTS="master ring": these headers alone
 	@scripts/need python3
-	@[ "$(BOARD)" ] || { echo "single: BOARD is one of $$(scripts/build/boards.py --list)" >&2; exit 1; }
+	@[ "$(BOARD)" ] || { echo "single: say BOARD=uno, or another board or archive of these:" >&2; \
+		scripts/build/boards.py --list | sed 1d >&2; exit 1; }
+	@scripts/build/single --check $(BOARD) $(PARTS)
 	@$(MAKE) --no-print-directory assembler BOARDS="$(BOARD)"
 	@scripts/build/single $(BOARD) dist/single/$$(echo $(BOARD) $(PARTS) | tr " " -) $(PARTS)
+
+# The boards on which those two files are tried, in scripts/check/single.
+SINGLE_BOARDS := uno cortex-m0plus cortex-m4 esp32c3
+.PHONY: single-parts check-single two-files
+single-parts:
+	@scripts/need python3 simavr qemu-system-arm qemu-system-misc gcc-avr avr-libc gcc-arm-none-eabi libnewlib-arm-none-eabi \
+		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf
+	@$(MAKE) --no-print-directory assembler BOARDS="$(SINGLE_BOARDS)"
+check-single: single-parts ## Drop those two files into an empty project: a master, a server and both on four boards, in simulators
+	@scripts/check/single
+two-files: single-parts ## Compare them with the two files of nanoMODBUS, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/two-files.md
+	@scripts/check/single --write "$(NANOMODBUS)"
 
 KINDS ?=
 .PHONY: check-dist

@@ -4,7 +4,7 @@ and boards by the names that people use. MBM_BOARDS says for which of them a pac
 boards and archives, such as "uno cortex-m4"; all if it is empty.
 
   boards.py --archives   prints the archives that the C SDK has for these boards
-  boards.py --list       prints the names that MBM_BOARDS may have
+  boards.py --list       prints the names that MBM_BOARDS may have: the families, then each archive and its boards
 """
 
 import difflib
@@ -158,6 +158,12 @@ def named() -> list:
     return [known(word) for word in words]
 
 
+def boards_of(family: str) -> list:
+    """The boards of a family, by name."""
+    kinds = FAMILIES[family][0]
+    return [board for row in SETS.values() if row.kind in kinds for archive in row.archives() for board in BOARDS.get(archive, "").split()]
+
+
 def set_names(word: str) -> list:
     """The instruction sets of a family or a board."""
     if word in FAMILIES:
@@ -194,7 +200,9 @@ def architectures() -> list:
 
 def main() -> None:
     if sys.argv[1:] == ["--list"]:
-        print(*names())
+        print("families:", *FAMILIES)
+        for archive in archives():
+            print(f"{archive}:", *BOARDS.get(archive, "").split())
     elif sys.argv[1:] == ["--archives"]:
         print(*named_archives())
     else:

@@ -114,8 +114,14 @@ class Arguments(unittest.TestCase):
             self.assertIn('there is no part "masters": there are base, functions, master', self.refused("uno", folder, "masters"))
             self.assertEqual(list(pathlib.Path(folder).iterdir()), [])
 
-    def test_a_family_of_boards_is_refused(self):
-        self.assertIn("arm is a family of boards; name one board", self.refused("arm", "/nowhere"))
+    def test_a_family_of_boards_is_refused_with_a_board_of_it(self):
+        self.assertIn("avr is a family of boards with several processors; name one board, such as uno", self.refused("avr", "/nowhere"))
+        self.assertIn("such as nucleo-f401re", self.refused("nucleo", "/nowhere"))
+
+    def test_board_and_parts_are_looked_at_without_writing_anything(self):
+        self.assertIn('there is no board or family "unno"', self.refused("--check", "unno"))
+        self.assertIn('there is no part "masters"', self.refused("--check", "uno", "masters"))
+        subprocess.run([ROOT / "scripts/build/single", "--check", "uno", "master"], check=True)
 
     def test_a_board_that_is_not_there_is_refused(self):
         self.assertIn('there is no board or family "unno"', self.refused("unno", "/nowhere"))
