@@ -67,10 +67,11 @@ DEBIAN_NEEDS = $(TOOL_NEEDS) dpkg-dev
 
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(SANITIZED_ARCHIVE)
+# Cargo must not look for the descriptors of make's job server, which only a `+` would hand on, also to a dry run.
 $(ARCHIVE):
-	+@CARGO="$(CARGO)" scripts/build/archive --host $@
+	@MAKEFLAGS= CARGO="$(CARGO)" scripts/build/archive --host $@
 $(SANITIZED_ARCHIVE):
-	@CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
+	@MAKEFLAGS= CARGO="$(CARGO)" scripts/build/archive --host $@ $(RUST_SANITIZERS)
 
 # The library for Linux: the archive with the ports of ports/linux, and libmbm-tls.a.
 LIBRARY := $(BUILD)/linux/libmbm.a
