@@ -33,6 +33,7 @@ LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
 # Those with a wire in memory. The others have lwIP's own thread.
 LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_porttest_lwip,$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
+PICO_TESTS := $(filter test_pico test_porttest_pico,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
@@ -302,8 +303,8 @@ $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
 $(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
-$(BUILD)/$(1)/test_pico: $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico_uart mbm_pico_usb)
-$(BUILD)/$(1)/test_pico: INCLUDES += -Ic-tests/pico -Iports/pico
+$(PICO_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico_uart mbm_pico_usb)
+$(PICO_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)

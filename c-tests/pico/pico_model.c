@@ -19,7 +19,7 @@ struct uart_inst {
 static struct uart_inst uarts[2];
 uart_inst_t *const uart0 = &uarts[0];
 uart_inst_t *const uart1 = &uarts[1];
-static uint8_t fromHost[600], packet[CFG_TUD_CDC_TX_BUFSIZE];
+static uint8_t fromHost[PICO_USB_BUFFER], packet[CFG_TUD_CDC_TX_BUFSIZE];
 static unsigned fromHostLength, packetLength;
 
 void pico_reset(void)
@@ -34,8 +34,10 @@ void pico_reset(void)
 
 static void call(uint32_t cause)
 {
-    if (uart1->isOn && (uart1->hw.imsc & cause))
-        uart1->handler();
+    if (!uart1->isOn || !(uart1->hw.imsc & cause))
+        return;
+    chip.interrupts++;
+    uart1->handler();
 }
 
 void pico_receive(uint32_t character)
@@ -195,16 +197,25 @@ absolute_time_t make_timeout_time_us(uint64_t us)
 
 bool best_effort_wfe_or_timeout(absolute_time_t end)
 {
-    chip.now = (uint32_t)end;
+    const unsigned before = chip.interrupts;
+
+    while (chip.pass != NULL && chip.interrupts == before && chip.now < end)
+        chip.pass();
+    if (chip.interrupts == before)
+        chip.now = (uint32_t)end;
     return true;
 }
 
 /* --- USB */
 
-void pico_from_host(const uint8_t *bytes, unsigned length)
+unsigned pico_from_host(const uint8_t *bytes, unsigned length)
 {
+    /* A full buffer of the device holds the host back. */
+    if (length > PICO_USB_BUFFER - fromHostLength)
+        length = PICO_USB_BUFFER - fromHostLength;
     memcpy(fromHost + fromHostLength, bytes, length);
     fromHostLength += length;
+    return length;
 }
 
 void tud_task_ext(uint32_t most, bool inInterrupt)

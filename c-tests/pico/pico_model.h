@@ -5,7 +5,7 @@
 
 #include "hardware/uart.h"
 
-enum { PICO_FIFO = 32 };
+enum { PICO_FIFO = 32, PICO_USB_BUFFER = 64 };
 
 typedef struct pico {
     uint32_t now; /* microseconds */
@@ -17,6 +17,8 @@ typedef struct pico {
     uint8_t toHost[600];
     unsigned toHostLength;
     unsigned tasks; /* how often tud_task_ext was called */
+    unsigned interrupts;
+    void (*pass)(void); /* what happens in a moment of sleep, which an interrupt ends; or NULL */
 } pico;
 extern pico chip;
 
@@ -28,7 +30,7 @@ void pico_receive(uint32_t character);
 void pico_idle(void);
 /* UART 1 sends the oldest character of its FIFO. */
 bool pico_send(void);
-/* The host sends bytes. */
-void pico_from_host(const uint8_t *bytes, unsigned length);
+/* The host sends bytes. Returns how many the device took. */
+unsigned pico_from_host(const uint8_t *bytes, unsigned length);
 
 #endif
