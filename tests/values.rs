@@ -39,6 +39,7 @@ fn read<T: Value + PartialEq + Debug>(bytes: &[u8], order: Order) -> T {
     registers.order = order;
     assert_eq!(registers.get::<T>(100), Ok(value));
     assert_eq!(over(bytes, 100).get_in::<T>(order, 100), Ok(value));
+    assert_eq!(T::from_words(&words, order), Ok(value));
     value
 }
 
@@ -53,6 +54,9 @@ fn written<T: Value>(value: T, order: Order) -> Vec<u8> {
     registers.set(100, value).unwrap();
     let of_words: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
     assert_eq!(of_words, bytes);
+    let mut only = vec![0xEEEE_u16; size / 2];
+    value.to_words(&mut only, order).unwrap();
+    assert_eq!(only, words);
     bytes
 }
 
@@ -231,6 +235,23 @@ fn registers_end_at_address_65535() {
     assert_eq!(refused(&[0_u16; 65536][..], 0), None);
     assert_eq!(refused(&[0_u16; 65537][..], 0), Some(OUTSIDE));
     assert_eq!(refused(&mut [0_u16; 2][..], 65535), Some(OUTSIDE));
+}
+
+#[test]
+fn a_number_in_words_is_in_the_first_of_them_or_refused() {
+    let words = [0x4366_u16, 0x8000, 0x1234];
+    assert_eq!(f32::from_words(&words, Order::Abcd), Ok(230.5));
+    assert_eq!(i16::from_words(&words[2..], Order::Badc), Ok(0x3412));
+    for order in Order::ALL {
+        assert_eq!(f32::from_words(&words[..1], order), Err(OUTSIDE));
+        assert_eq!(u64::from_words(&words, order), Err(OUTSIDE));
+        assert_eq!(u16::from_words(&[], order), Err(OUTSIDE));
+        let mut written = words;
+        assert_eq!(1_u64.to_words(&mut written, order), Err(OUTSIDE));
+        assert_eq!(written, words);
+        assert_eq!(1_u16.to_words(&mut written, order), Ok(()));
+        assert_eq!(written[1..], words[1..]);
+    }
 }
 
 #[test]

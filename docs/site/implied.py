@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-FUNCTION = re.compile(r"(/\*\*(?:(?!\*/).)*?)( ?\*/\n)([a-z][\w *]*?\bmbm_\w+\()([^;{]*)(\);)", re.S)
+FUNCTION = re.compile(r"(/\*\*(?:(?!\*/).)*?)( ?\*/\n)([a-z][\w *]*?\bmbm_\w+\()([^;{]*)(\);|\)(?=\n\{))", re.S)
 PARAMETER = re.compile(r"(mbm_\w+)?[ *]+(\w+)(?:,|$)")
 
 
@@ -30,7 +30,7 @@ def explained(found, comments):
         # `client` is an mbm_client, `request` an mbm_clientRequest.
         elif kind.lower().endswith(name.lower()):
             comment += f" @param {name} the object"
-    if head.startswith("uint8_t ") and "@return" not in comment:
+    if re.match(r"(static inline )?uint8_t ", head) and "@return" not in comment:
         comment += " @return a status"
     return comment + end + head + parameters + tail
 

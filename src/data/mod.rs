@@ -16,4 +16,5 @@ pub mod value;
 pub mod view;
 
 pub use order::Order;
+pub use value::Value;
 pub use view::Registers;

@@ -1,5 +1,8 @@
 //! Numbers of one, two or four registers. Floats are copied as bits, without arithmetic.
 
+use super::order::Order;
+use crate::error::Error;
+
 /// A number of one, two or four registers.
 ///
 /// ```
@@ -35,6 +38,62 @@ pub trait Value: Copy {
 
     /// The bytes of this number.
     fn to_bytes(self) -> Self::Bytes;
+
+    /// The number in the first of `words`, as a device with that order sends it.
+    ///
+    /// # Errors
+    /// [`Error::IllegalDataAddress`] if there are too few words.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Value};
+    ///
+    /// let words = [0x8000, 0x4366];
+    /// assert_eq!(f32::from_words(&words, Order::Cdab)?, 230.5);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
+    fn from_words(words: &[u16], order: Order) -> Result<Self, Error> {
+        let mut bytes = Self::Bytes::default();
+        let mask = order.mask(bytes.as_ref().len());
+        for (place, byte) in bytes.as_mut().iter_mut().enumerate() {
+            let place = place ^ mask;
+            let word = words.get(place / 2).ok_or(Error::IllegalDataAddress)?;
+            *byte = if place.is_multiple_of(2) {
+                (word >> 8) as u8
+            } else {
+                *word as u8
+            };
+        }
+        Ok(Self::from_bytes(bytes))
+    }
+
+    /// Writes this number into the first of `words`, as [`Value::from_words`] reads it.
+    ///
+    /// # Errors
+    /// [`Error::IllegalDataAddress`] if there are too few words; nothing is written then.
+    ///
+    /// ```
+    /// use mbm::data::{Order, Value};
+    ///
+    /// let mut words = [0; 2];
+    /// 230.5_f32.to_words(&mut words, Order::Cdab)?;
+    /// assert_eq!(words, [0x8000, 0x4366]);
+    /// # Ok::<(), mbm::Error>(())
+    /// ```
+    fn to_words(self, words: &mut [u16], order: Order) -> Result<(), Error> {
+        let bytes = self.to_bytes();
+        let bytes = bytes.as_ref();
+        let mask = order.mask(bytes.len());
+        let words = words.get_mut(..bytes.len().div_ceil(2));
+        for (place, word) in words
+            .ok_or(Error::IllegalDataAddress)?
+            .iter_mut()
+            .enumerate()
+        {
+            let byte = |place: usize| bytes.get(place ^ mask).copied().unwrap_or(0);
+            *word = u16::from_be_bytes([byte(2 * place), byte(2 * place + 1)]);
+        }
+        Ok(())
+    }
 }
 
 macro_rules! values {
