@@ -289,7 +289,7 @@ TEST(a_client_may_connect_again_in_its_callback)
     device.context = &device;
     client_connect();
     client_reads();
-    tcp_abort(places[0].pcb);
+    serve_reset();
     wire_pass(100, serve);
     OK(mbm_lwip_status(&device));
     client_reads();
@@ -298,7 +298,7 @@ TEST(a_client_may_connect_again_in_its_callback)
     client_queue(1);
     only_poll();
     the_wire.isCut = 0;
-    tcp_abort(places[0].pcb);
+    serve_reset();
     /* The client does not know that it is another connection. */
     wire_pass(2000, serve_and_poll);
     IS(MBM_RESPONSE_TIMED_OUT, request.status);

@@ -143,7 +143,7 @@ TEST(a_reset_of_an_idle_connection_is_seen_by_the_link)
     IS(MBM_PENDING, mbm_lwip_open(&device, &the_wire.far, PORT));
     begin_link();
     client_reads();
-    tcp_abort(places[0].pcb);
+    serve_reset();
     wire_deliver();
     IS(MBM_LINK_LOST, mbm_lwip_status(&device));
     client_reads();

@@ -29,6 +29,19 @@ void serve(void)
     }
 }
 
+void serve_reset(void)
+{
+    int i, count = 0;
+
+    for (i = 0; i < PLACES; i++) {
+        if (places[i].pcb) {
+            tcp_abort(places[i].pcb);
+            count++;
+        }
+    }
+    assert_true(count > 0);
+}
+
 /* --- the client */
 
 mbm_lwip device;
@@ -137,6 +150,11 @@ void peer_send(peer *one, const void *bytes, uint16_t length)
     assert_non_null(one->pcb);
     assert_int_equal(tcp_write(one->pcb, bytes, length, TCP_WRITE_FLAG_COPY), ERR_OK);
     assert_int_equal(tcp_output(one->pcb), ERR_OK);
+}
+
+int peer_canAsk(const peer *one)
+{
+    return tcp_sndbuf(one->pcb) >= FRAME && tcp_sndqueuelen(one->pcb) < TCP_SND_QUEUELEN / 2;
 }
 
 void peer_ask(peer *one, uint16_t number, uint8_t quantity)

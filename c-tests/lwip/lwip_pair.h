@@ -19,6 +19,8 @@ extern uint32_t ends; /* connections whose end the server has seen */
 
 /* A round of its main loop. */
 void serve(void);
+/* Resets all its connections, as if lwIP did. */
+void serve_reset(void);
 
 /* --- the client */
 
@@ -47,7 +49,7 @@ typedef struct peer {
     uint8_t isConnected, isEnded;
     err_t error; /* of lwIP, when the connection has failed */
     uint32_t count;
-    uint8_t bytes[0x20000]; /* what has come */
+    uint8_t bytes[0x30000]; /* what has come */
 } peer;
 
 extern peer peers[PLACES + 2];
@@ -56,6 +58,7 @@ void peer_connect(peer *one);
 /* Sends bytes at once, in one segment. */
 void peer_send(peer *one, const void *bytes, uint16_t length);
 /* Sends the request number `number`, a read of registers from 0 on. */
+int peer_canAsk(const peer *one); /* lwIP takes a request now */
 void peer_ask(peer *one, uint16_t number, uint8_t quantity);
 /* Fails if other than these responses to peer_ask have come, from `first` on. */
 void peer_expects(const peer *one, uint16_t first, uint16_t count, uint8_t quantity);
