@@ -76,6 +76,7 @@ WAYS = {
     "docs/guide-mcu.md": guide("the C SDK", SDK, "make sdk", board="cortex-m4"),
     "docs/guide-pico.md": guide("the C SDK", SDK, "make sdk", board="pico"),
     "docs/guide-freertos.md": guide("the C SDK", SDK, "make sdk", board="cortex-m3"),
+    "docs/guide-lwip.md": guide("the C SDK", SDK, "make sdk", board="cortex-m4"),
     "docs/guide-stm32.md": guide("the C SDK", SDK, "make sdk", board="stm32f4"),
     "docs/guide-rt-thread.md": guide("the package", "mbm-rt-thread-VERSION.tar.gz", "make package KIND=rt-thread"),
     "docs/guide-rust.md": Way(f"`cargo add mbm` takes the crate. Or download `mbm-VERSION.crate` {RELEASE} and unpack it.",

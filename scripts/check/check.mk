@@ -63,8 +63,8 @@ KIT ?=
 FOLDER ?=
 BOARDS ?=
 .PHONY: check-real
-check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, stm32 or pico, FOLDER=its folder
-	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi \
+check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, lwip, stm32 or pico, FOLDER=its folder
+	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi \
 		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm
 	@$(MAKE) --no-print-directory BOARDS= assembler $(BUILD)/plain/mbm
 	@scripts/check/real $(KIT) $(FOLDER) $(BOARDS)
@@ -134,7 +134,7 @@ address: ## Write the address of packaging/project.toml into the links to releas
 PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE) $(PEERS)
 .PHONY: check-pages
 check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
+	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev liblwip-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
 		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
 		$(FIRMWARE_LIBC)

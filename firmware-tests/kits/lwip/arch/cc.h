@@ -8,11 +8,4 @@
 /* A firmware would reset; the tests fail. */
 #define LWIP_PLATFORM_ASSERT(x) abort()
 #define LWIP_RAND() ((u32_t)rand())
-/* The C library of this machine has these, so lwIP leaves them out. */
-#ifdef __linux__
-#define LWIP_TIMEVAL_PRIVATE 0
-#include <limits.h>
-#include <sys/time.h>
-#endif
-
 #endif
