@@ -312,6 +312,8 @@ $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Ipor
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
 $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,lwip_wire lwip_pair)
 $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): LIBS += -Wl$(comma)--wrap=tcp_write$(comma)--wrap=tcp_new_ip_type
+$(BUILD)/$(1)/test_lwip_examples: $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve)
+$(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve): INCLUDES += -Dmain=example_$$(notdir $$*)
 $(patsubst %,$(BUILD)/$(1)/test_%,lwip_task porttest_lwip): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
