@@ -117,7 +117,7 @@ header: ## Generate include/mbm.h and its parts from the source
 	@$(HEADER)
 
 # The features of the core that firmware may have.
-FEATURES := defmt,embedded-io,embedded-io-async
+FEATURES := defmt,embedded-io,embedded-io-async,usbd-serial
 # The others need another target, or compile C first, or the standard library, with which the archive
 # does not compile.
 LINTED := --workspace --exclude mbm-example --exclude mbm-embassy-example --exclude mbm-bench --exclude mbm-host-example

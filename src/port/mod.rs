@@ -10,6 +10,8 @@ mod polled_io;
 mod std_io;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod transmission;
+#[cfg(feature = "usbd-serial")]
+mod usb_serial;
 
 #[cfg(feature = "embedded-io-async")]
 pub(crate) use self::async_io::hold;
@@ -21,6 +23,8 @@ pub use self::embedded_io::EmbeddedIo;
 pub use self::polled_io::PolledIo;
 #[cfg(feature = "std")]
 pub use self::std_io::StdIo;
+#[cfg(feature = "usbd-serial")]
+pub use self::usb_serial::UsbSerial;
 
 use crate::error::Error;
 
