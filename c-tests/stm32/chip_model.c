@@ -51,6 +51,11 @@ void chip_start_uart(void)
     huart1.gState = huart1.RxState = HAL_UART_STATE_READY;
 }
 
+unsigned chip_kept(void)
+{
+    return 1;
+}
+
 void chip_stop_uart(void)
 {
     huart1.gState = huart1.RxState = HAL_UART_STATE_RESET;

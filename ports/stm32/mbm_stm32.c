@@ -75,6 +75,8 @@ static void before_sending(mbm_stm32Line *line, uint16_t length)
 #endif
 }
 
+/* Called before the DMA begins too: what the program has written to the buffer, such as zeros,
+ * would else reach the memory later, over what the DMA has put there. */
 static void before_reading(mbm_stm32Line *line)
 {
 #if defined(__DCACHE_PRESENT) && __DCACHE_PRESENT
@@ -176,6 +178,7 @@ static HAL_StatusTypeDef receive(mbm_stm32Line *line)
     if (!receives_by_dma(uart))
         return HAL_UART_Receive_IT(uart, &line->byte, 1);
     line->lost = mbm_stm32_lost(line);
+    before_reading(line);
     mbm_dmaRing_begin(&line->ring.ofDma, line->received, sizeof line->received, remaining, line);
     status = HAL_UARTEx_ReceiveToIdle_DMA(uart, line->received, sizeof line->received);
     /* In its interrupt for errors the HAL would stop the DMA at each disturbed character. The CRC

@@ -19,6 +19,10 @@ CHIPS = {
     "h7": ("STM32H743xx", "startup_stm32h743xx.s", "-mcpu=cortex-m7 -mfloat-abi=hard -mfpu=fpv5-d16", "cortex-m7",
            "0x08000000", "0x24000000, LENGTH = 512K"),
 }
+# What plays the registers of a family on this machine, and the boards of that kind. A FIFO's threshold ends the name of a board.
+PLAYED = {"f1": ("usart_sr", "dma_channel"), "f4": ("usart_sr", "dma_stream"), "g0": ("usart_isr", "dma_channel"),
+          "h7": ("usart_isr", "dma_stream", "cache")}
+HOSTS = (*(f"host-{name}" for name in PLAYED), "host-g0-1_8", "host-g0-1_2", "host-h7-1_8")
 EXAMPLES = ("read_registers", "client", "serve")
 MEMORY = """\
 MEMORY { FLASH (rx) : ORIGIN = %s, LENGTH = 64K  RAM (rwx) : ORIGIN = %s }
@@ -92,8 +96,8 @@ class Family:
 def check(kit, boards: tuple) -> None:
     """Builds for each family, and runs where the chip is played."""
     for name in boards:
-        if name == "host":
-            on_this_machine(kit)
+        if name.startswith("host-"):
+            on_this_machine(kit, name)
             continue
         family = Family(kit, name)
         for example in EXAMPLES:
@@ -144,10 +148,11 @@ def serve_in_qemu(kit, image: pathlib.Path) -> None:
     print("real: stm32 f4: the chip serves its unit to mbm, 100 requests by interrupt")
 
 
-def on_this_machine(kit) -> None:
-    """Runs the tests c-tests/test_stm32*.c over the source of the HAL, whose registers are played."""
-    name, root, tests = "f4", kit.root, ("test_stm32", "test_stm32_server")
-    hal, work, host = kit.there(kit.tree / f"stm32{name}xx_hal_driver"), kit.work / "host", root / "firmware-tests/kits/stm32/host"
+def on_this_machine(kit, board: str) -> None:
+    """Runs the tests c-tests/test_stm32*.c over the source of a family's HAL, whose registers are played."""
+    _, name, *threshold = board.split("-")
+    root, tests, played = kit.root, ("test_stm32", "test_stm32_server"), PLAYED[name]
+    hal, work, host = kit.there(kit.tree / f"stm32{name}xx_hal_driver"), kit.work / board, root / "firmware-tests/kits/stm32/host"
     work.mkdir()
     template = kit.there(hal / f"Inc/stm32{name}xx_hal_conf_template.h")
     (work / f"stm32{name}xx_hal_conf.h").write_text(template.read_text())
@@ -155,11 +160,14 @@ def on_this_machine(kit) -> None:
     low = ["gcc", "-std=gnu11", "-g", "-no-pie", "-fno-pie", f"-I{root}/include", f"-I{root}/c-tests", f"-I{root}/c-tests/support",
            "-I", work, f"-I{root}/c-tests/stm32", f"-I{root}/ports/stm32", f"-I{host}"]
     with_hal = [f"-D{CHIPS[name][0]}", "-DUSE_HAL_DRIVER", "-include", host / "shim.h", f"-I{work}", "-isystem", hal / "Inc", "-isystem",
-                kit.tree / f"cmsis_device_{name}/Include", "-isystem", kit.tree / "cmsis_core/Core/Include"]
+                kit.tree / f"cmsis_device_{name}/Include", "-isystem", kit.tree / "cmsis_core/Core/Include",
+                *(f"-DWITH_FIFO=UART_RXFIFO_THRESHOLD_{eighths}" for eighths in threshold)]
     (work / "main.h").write_text(f'#include "stm32{name}xx_hal.h"\nextern UART_HandleTypeDef huart1;\n'
                                  "#define MBM_STM32_RECEIVE_BYTES 64\n")
-    sources = [*((hal / f"Src/stm32{name}xx_hal_{part}.c", ["-w", *with_hal]) for part in ("uart", "dma", "gpio")),
-               (host / f"chip_{name}.c", ["-Wall", "-Wextra", "-Werror", *with_hal]), (host / "registers.c", ["-O1"]),
+    parts = [hal / f"Src/stm32{name}xx_hal_{part}.c" for part in ("uart", "uart_ex", "dma", "gpio")]
+    sources = [*((part, ["-w", *with_hal]) for part in parts if part.exists()),
+               *((host / f"{part}.c", ["-Wall", "-Wextra", "-Werror", *with_hal]) for part in ("chip", *played)),
+               (host / "registers.c", ["-O1"]),
                (root / "c-tests/stm32/machine.c", ["-O1"]), (root / "c-tests/support/test.c", ["-O1"]),
                *((root / source, ["-O1", "-Wall", "-Wextra", "-Werror", *with_hal]) for source in
                  (*(f"c-tests/{test}.c" for test in tests), "c-tests/stm32/uart.c", "ports/stm32/mbm_stm32.c",
@@ -174,6 +182,6 @@ def on_this_machine(kit) -> None:
         said = kit.run(kit.log, [work / test])
         passed = re.search(r"PASSED\s+\] (\d+) test", said) or re.search(r"^1\.\.(\d+)$", said, re.M)
         if not passed or "FAILED" in said or "not ok" in said:
-            kit.fail(f"the tests over the HAL's source print:\n{said[-3000:]}")
+            kit.fail(f"{board}: the tests over the HAL's source print:\n{said[-3000:]}")
         count += int(passed[1])
-    print(f"real: stm32 host: {count} tests of the port over the source of the HAL, by DMA and by interrupt")
+    print(f"real: stm32 {board}: {count} tests of the port over the source of the HAL, by DMA and by interrupt")
