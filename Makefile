@@ -62,9 +62,12 @@ archive: $(ARCHIVE) ## Build the archive for this machine, target/release/libmbm
 	@echo "archive: $(ARCHIVE), by $$(cat $(dir $(ARCHIVE))compiler)"
 
 # What the packages for users need. Each target looks for all of it before it builds anything.
-LINUX_NEEDS = rust gcc libc6-dev binutils pkg-config libmbedtls-dev
-TOOL_NEEDS = $(LINUX_NEEDS) help2man libcjson-dev libyaml-dev libmosquitto-dev
+# The library goes without TLS where nothing may be installed.
+LINUX_NEEDS = rust gcc libc6-dev binutils pkg-config $(if $(filter no,$(MBM_INSTALL)),,libmbedtls-dev)
+TOOL_NEEDS = $(filter-out libmbedtls-dev,$(LINUX_NEEDS)) libmbedtls-dev help2man libcjson-dev libyaml-dev libmosquitto-dev
 DEBIAN_NEEDS = $(TOOL_NEEDS) dpkg-dev
+# Without Python nothing knows the boards, and so the assemblers that they need; the rest is known.
+NEED_PYTHON = command -v python3 >/dev/null || scripts/build/archive --packages -- python3
 
 # Phony, because Cargo decides what is out of date.
 .PHONY: $(ARCHIVE) $(SANITIZED_ARCHIVE)

@@ -17,7 +17,7 @@ need-packages:
 .PHONY: sdk-parts
 sdk-parts:
 	@archives=$$(MBM_BOARDS="$(BOARDS)" scripts/build/boards.py --archives) && \
-		scripts/build/archive --packages $$archives -- $(LINUX_NEEDS) && \
+		scripts/build/archive --packages $$archives -- $(LINUX_NEEDS) libmbedtls-dev && \
 		$(MAKE) --no-print-directory -j$$(nproc) linux assembler $$(printf 'build-archive-%s ' $$archives)
 
 .PHONY: dist-parts
@@ -50,7 +50,7 @@ PACKAGE_KINDS := $(patsubst packaging/%/pack,%,$(wildcard packaging/*/pack))
 .PHONY: package
 package: ## Write the packages of one kind to dist/, KIND=arduino, crates, debian, esp-idf, platformio, rt-thread, sdk or zephyr
 	@[ -n "$(filter $(KIND),$(PACKAGE_KINDS))" ] || { echo "package: KIND is one of $(PACKAGE_KINDS)" >&2; exit 1; }
-	@scripts/need $(or $(NEEDS_$(KIND)),python3)
+	@$(if $(NEEDS_$(KIND)),scripts/need $(NEEDS_$(KIND)),$(NEED_PYTHON))
 	@$(if $(PARTS_$(KIND)),$(MAKE) --no-print-directory $(PARTS_$(KIND)))
 	@mkdir -p dist
 	@MBM_BOARDS="$(BOARDS)" packaging/$(KIND)/pack dist
@@ -66,7 +66,7 @@ deb: ## Write the Debian packages of this machine to dist/: mbm, libmbm0 and lib
 BOARD ?=
 PARTS ?=
 single: ## Write mbm.h and mbm.S, the library for BOARD in two files, to dist/single; PARTS="master ring": these headers alone
-	@scripts/need python3
+	@$(NEED_PYTHON)
 	@[ "$(BOARD)" ] || { echo "single: say BOARD=uno, or another board or archive of these:" >&2; \
 		scripts/build/boards.py --list | sed 1d >&2; exit 1; }
 	@scripts/build/single --check $(BOARD) $(PARTS)
@@ -84,6 +84,13 @@ check-single: single-parts ## Drop those two files into an empty project: a mast
 	@scripts/check/single
 two-files: single-parts ## Compare them with the two files of nanoMODBUS, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/two-files.md
 	@scripts/check/single --write "$(NANOMODBUS)"
+
+# DOOR is a word of a door's heading. Without it the page is written.
+DOOR ?=
+.PHONY: doors
+doors: tool ## Open the doors of the README on a Debian 12 with nothing installed; transcripts in build/doors; writes docs/reports/doors.md
+	@scripts/need python3 mmdebstrap git
+	@scripts/bench/doors $(or $(DOOR),--write)
 
 KINDS ?=
 .PHONY: check-dist

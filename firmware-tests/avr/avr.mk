@@ -5,7 +5,7 @@ assembler library arduino-zip: export MBM_BOARDS := $(BOARDS)
 
 .PHONY: assembler
 assembler: ## Write the library as assembler source, one file for each instruction set, build/assembler; BOARDS="uno esp32" for some
-	@scripts/need python3
+	@$(NEED_PYTHON)
 	@scripts/build/assembler
 
 .PHONY: library

@@ -430,6 +430,17 @@ class Need(unittest.TestCase):
         self.assertIn("apt-get remove rustc cargo\n", found.stderr)
         self.assertNotIn("apt-get update", found.stderr)
 
+    def test_a_package_is_named_once(self):
+        self.assertIn("missing: rustc-web cargo-web gcc\n", self.need("rust", "gcc", "rustc-web", "gcc").stderr)
+
+    def test_what_every_board_needs_is_known_without_python(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program(pathlib.Path(folder) / "dpkg-query", "exit 1")
+            found = subprocess.run([ROOT / "scripts/build/archive", "--packages", "--", "python3"],
+                                   env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "MBM_INSTALL": "no", "MBM_RUST": ""},
+                                   capture_output=True, text=True)
+            self.assertIn("missing: cargo-web python3 rust-web-src rustc-web\n", found.stderr)
+
     def test_the_packages_that_a_caller_adds_are_named_in_the_same_sentence(self):
         with tempfile.TemporaryDirectory() as folder:
             program(pathlib.Path(folder) / "dpkg-query", "exit 1")
