@@ -256,6 +256,50 @@ TEST(several_clients_get_each_its_own_answers)
         peer_expects(&peers[j], (uint16_t)(1000 * j), 50, (uint8_t)(j + 1));
 }
 
+/* Chance decides how many bytes each end sends and reads, in which pbufs they come, and when lwIP
+ * has no memory. What is read is what was sent, in its order. */
+TEST(any_pieces_in_any_order_are_the_same_stream)
+{
+    enum { BYTES = 60000 };
+    static uint8_t got[2][BYTES];
+    const mbm_port ports[2] = {mbm_lwip_port(&device), mbm_lwip_port(&places[0])};
+    uint32_t sent[2] = {0, 0}, read[2] = {0, 0}, seed = 1, i, rounds;
+    uint8_t bytes[2000];
+
+    client_connect();
+    assert_int_equal(mbm_lwip_accept(&listener), 0);
+    for (rounds = 0; rounds < 200000 && (read[0] < BYTES || read[1] < BYTES); rounds++) {
+        uint16_t length;
+        int end, got_now;
+
+        seed = seed * 1664525 + 1013904223;
+        end = (int)(seed >> 31);
+        length = (uint16_t)(1 + (seed >> 8) % ((seed >> 20) % 8 ? 30 : 1500));
+        the_wire.first = (uint16_t)((seed >> 24) % 20);
+        the_wire.others = (uint16_t)((seed >> 16) % 40);
+        failing_writes = (seed >> 12) % 7 == 0;
+        if ((seed >> 5) % 2) {
+            length = (uint16_t)LWIP_MIN(length, BYTES - sent[end]);
+            for (i = 0; i < length; i++)
+                bytes[i] = (uint8_t)((sent[end] + i) * 7 + ((sent[end] + i) >> 8));
+            got_now = ports[end].write(ports[end].context, bytes, length);
+            assert_true(got_now >= 0);
+            sent[end] += (uint32_t)got_now;
+        } else {
+            length = (uint16_t)LWIP_MIN(length, BYTES - read[end]);
+            got_now = ports[end].read(ports[end].context, got[end] + read[end], length);
+            assert_true(got_now >= 0);
+            read[end] += (uint32_t)got_now;
+        }
+        if ((seed >> 3) % 3 == 0)
+            wire_pass((seed >> 10) % 4 ? 1 : 300, NULL);
+    }
+    for (i = 0; i < BYTES; i++) {
+        assert_int_equal(got[0][i], (uint8_t)(i * 7 + (i >> 8)));
+        assert_int_equal(got[1][i], (uint8_t)(i * 7 + (i >> 8)));
+    }
+}
+
 TEST(twenty_thousand_requests_and_ten_resets)
 {
     static mbm_link kept;

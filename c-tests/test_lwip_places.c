@@ -163,6 +163,31 @@ TEST(a_connection_that_lwip_has_no_memory_for_closes_an_idle_one)
     is_served(&peers[1]);
 }
 
+/* lwIP tries for minutes to end a connection whose peer is gone. With a fixed number of control
+ * blocks, as in `make check-real KIT=lwip`, a new connection takes that of such a one. */
+TEST(connections_to_peers_that_are_gone_make_way_in_lwip)
+{
+    int i;
+
+    listener.idleTimeMs = 1;
+    fill();
+    for (i = 0; i < 40; i++) {
+        /* It vanishes without a word. */
+        the_wire.isCut = 1;
+        peer_reset(&peers[i % PLACES]);
+        wire_pass(2, serve);
+        the_wire.isCut = 0;
+        peer_connect(&peers[i % PLACES]);
+        the_wire.isCut = 1; /* nothing of what lwIP sends for the others arrives */
+        serve();
+        the_wire.isCut = 0;
+        assert_int_equal(peers[i % PLACES].isConnected, 1);
+        assert_int_equal(peers[i % PLACES].error, ERR_OK);
+    }
+    assert_int_equal(listener.refused, 0);
+    assert_int_equal(listener.idle, 40);
+}
+
 TEST(a_thousand_connections_one_after_the_other_leave_nothing_behind)
 {
     int i;
