@@ -223,6 +223,18 @@ TEST(a_response_that_was_written_before_close_still_leaves)
     assert_true(peers[0].isEnded);
 }
 
+TEST(a_second_write_leaves_before_the_first_is_acknowledged)
+{
+    const mbm_port port = mbm_lwip_port(&places[0]);
+
+    peer_connect(&peers[0]);
+    assert_int_equal(mbm_lwip_accept(&listener), 0);
+    assert_int_equal(port.write(port.context, (const uint8_t *)"1", 1), 1);
+    assert_int_equal(wire_underWay(), 1);
+    assert_int_equal(port.write(port.context, (const uint8_t *)"2", 1), 1);
+    assert_int_equal(wire_underWay(), 2);
+}
+
 TEST(bytes_that_came_before_a_reset_can_be_read)
 {
     const mbm_port port = mbm_lwip_port(&places[0]);

@@ -203,6 +203,29 @@ TEST(a_response_that_found_no_memory_is_sent_by_a_callback)
     peer_expects(&peers[0], 4, 1, 4);
 }
 
+TEST(a_response_that_found_no_room_is_sent_as_soon_as_there_is_some)
+{
+    uint32_t before;
+    uint16_t i, count = 0;
+
+    run_by_callbacks();
+    peer_connect(&peers[0]);
+    peers[0].isDeaf = 1;
+    for (i = 0; i < 3000 && !(places[0].flags & MBM_LWIP_WAITS); i++) {
+        if (peer_canAsk(&peers[0]))
+            peer_ask(&peers[0], count++, 125);
+        wire_pass(10, NULL);
+    }
+    assert_true(places[0].flags & MBM_LWIP_WAITS);
+    before = calls;
+    peers[0].isDeaf = 0;
+    tcp_recved(peers[0].pcb, (u16_t)peers[0].count);
+    wire_deliver(); /* no time has passed */
+    assert_true(calls > before);
+    wire_pass(10000, NULL);
+    peer_expects(&peers[0], 0, count, 125);
+}
+
 TEST(a_connection_that_replaces_an_idle_one_is_served_by_callbacks)
 {
     int i;

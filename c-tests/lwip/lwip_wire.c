@@ -85,6 +85,11 @@ static struct pbuf *chain_of(const uint8_t *bytes, uint16_t length)
     return chain;
 }
 
+uint32_t wire_underWay(void)
+{
+    return sent - delivered;
+}
+
 void wire_deliver(void)
 {
     while (delivered != sent) {

@@ -30,6 +30,9 @@ void wire_begin(void);
 /* Frees what a test has left, and fails if it has left a connection. */
 void wire_end(void);
 
+/* Number of packets that are under way. */
+uint32_t wire_underWay(void);
+
 /* Delivers the packets that are under way. */
 void wire_deliver(void);
 

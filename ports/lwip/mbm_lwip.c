@@ -97,7 +97,7 @@ static uint8_t has_place_for(mbm_lwip *link, const struct pbuf *more)
         return 0;
     if (pbuf_clen(held) + pbuf_clen(more) > MBM_LWIP_PBUFS && held->tot_len <= MOST_JOINED)
         held = link->received = pbuf_coalesce(link->received, PBUF_RAW);
-    return pbuf_clen(held) == 1 || pbuf_clen(held) + pbuf_clen(more) <= MBM_LWIP_PBUFS;
+    return pbuf_clen(held) + pbuf_clen(more) <= MBM_LWIP_PBUFS;
 }
 
 static err_t on_received(void *context, struct tcp_pcb *pcb, struct pbuf *p, err_t error)
@@ -176,7 +176,7 @@ static err_t on_poll(void *context, struct tcp_pcb *pcb)
         on_error(link, lost);
         return ERR_ABRT;
     }
-    return link->flags & (MBM_LWIP_WAITS | MBM_LWIP_IS_NEW) ? report(link, pcb) : ERR_OK;
+    return link->flags & MBM_LWIP_WAITS ? report(link, pcb) : ERR_OK;
 }
 
 /* --- the beginning of a connection */

@@ -47,12 +47,14 @@ static mbm_lwip *ended(const mbm_lwip_listener *listener)
     for (i = 0; i < listener->count; i++) {
         mbm_lwip *place = &listener->places[i];
 
-        if (is_new(place))
-            continue;
         if (place->state == MBM_LWIP_CONNECTED && place->flags & MBM_LWIP_IS_ENDED &&
-            place->received == NULL)
-            mbm_lwip_leave(place, MBM_LWIP_LOST, ERR_CLSD, 0);
-        if (place->state == MBM_LWIP_LOST)
+            place->received == NULL) {
+            if (is_new(place))
+                mbm_lwip_reset(place, ERR_CLSD);
+            else
+                mbm_lwip_leave(place, MBM_LWIP_LOST, ERR_CLSD, 0);
+        }
+        if (place->state != MBM_LWIP_CONNECTED)
             return place;
     }
     return NULL;
