@@ -11,7 +11,7 @@
 wire the_wire;
 
 /* The packets that are under way, of at most 1500 bytes each. */
-enum { PACKETS = 1024, BYTES = 1500, SOURCE = 12, TARGET = 16, FLAGS = 13, RST = 4 };
+enum { PACKETS = 1024, BYTES = 1500, FLAGS = 13, RST = 4 };
 static struct {
     uint16_t length;
     uint8_t bytes[BYTES];
@@ -26,21 +26,42 @@ u32_t sys_now(void)
     return the_wire.ms;
 }
 
-static err_t send_packet(struct netif *from, struct pbuf *p, const ip4_addr_t *target)
+static uint16_t length_of_ip(const uint8_t *bytes)
 {
-    uint8_t *bytes = packets[sent % PACKETS].bytes, swapped[4];
+    return (uint16_t)(bytes[0] >> 4 == 6 ? 40 : 4 * (bytes[0] & 0xF));
+}
+
+/* `source` and `size`: where the first address is, and how long. */
+static err_t send_swapped(struct pbuf *p, size_t source, size_t size)
+{
+    uint8_t *bytes = packets[sent % PACKETS].bytes, swapped[16];
 
     if (the_wire.isCut)
         return ERR_OK;
     assert_true(sent - delivered < PACKETS);
     packets[sent % PACKETS].length = pbuf_copy_partial(p, bytes, BYTES, 0);
+    /* Of IPv6 lwIP sends other packets too. */
+    if (bytes[size == 4 ? 9 : 6] != IP_PROTO_TCP)
+        return ERR_OK;
     /* The checksums of IP and TCP stay right, since they are sums. */
-    memcpy(swapped, bytes + SOURCE, 4);
-    memcpy(bytes + SOURCE, bytes + TARGET, 4);
-    memcpy(bytes + TARGET, swapped, 4);
+    memcpy(swapped, bytes + source, size);
+    memcpy(bytes + source, bytes + source + size, size);
+    memcpy(bytes + source + size, swapped, size);
     sent++;
     return ERR_OK;
 }
+
+static err_t send_packet(struct netif *from, struct pbuf *p, const ip4_addr_t *target)
+{
+    return send_swapped(p, 12, 4);
+}
+
+#if LWIP_IPV6
+static err_t send_packet6(struct netif *from, struct pbuf *p, const ip6_addr_t *target)
+{
+    return send_swapped(p, 8, 16);
+}
+#endif
 
 static err_t begin_interface(struct netif *interface)
 {
@@ -48,6 +69,9 @@ static err_t begin_interface(struct netif *interface)
     interface->name[1] = 'i';
     interface->mtu = BYTES;
     interface->output = send_packet;
+#if LWIP_IPV6
+    interface->output_ip6 = send_packet6;
+#endif
     return ERR_OK;
 }
 
@@ -55,7 +79,7 @@ static err_t begin_interface(struct netif *interface)
  * one. */
 static struct pbuf *chain_of(const uint8_t *bytes, uint16_t length)
 {
-    const uint16_t ip = (uint16_t)(4 * (bytes[0] & 0xF));
+    const uint16_t ip = length_of_ip(bytes);
     const uint16_t headers = (uint16_t)(ip + 4 * (bytes[ip + 12] >> 4));
     const uint16_t data = (uint16_t)(length - headers);
     uint16_t at = 0, part = length;
@@ -103,7 +127,7 @@ void wire_deliver(void)
         if (p == NULL)
             continue;
         the_wire.packets++;
-        the_wire.resets += (bytes[4 * (bytes[0] & 0xF) + FLAGS] & RST) != 0;
+        the_wire.resets += (bytes[length_of_ip(bytes) + FLAGS] & RST) != 0;
         assert_int_equal(netif.input(p, &netif), ERR_OK);
     }
 }
@@ -127,11 +151,17 @@ void wire_begin(void)
     const uint32_t ms = the_wire.ms;
     static int has_begun;
     ip4_addr_t address, mask, gateway;
+#if LWIP_IPV6
+    ip_addr_t address6;
+#endif
 
     memset(&the_wire, 0, sizeof the_wire);
     the_wire.ms = ms;
     sent = delivered = 0;
     IP_ADDR4(&the_wire.far, 10, 0, 0, 2);
+#if LWIP_IPV6
+    IP_ADDR6(&the_wire.far6, PP_HTONL(0xFD000000), 0, 0, PP_HTONL(2));
+#endif
     if (has_begun)
         return;
     has_begun = 1;
@@ -144,6 +174,11 @@ void wire_begin(void)
     assert_non_null(netif_add(&netif, &address, &mask, &gateway, NULL, begin_interface, ip_input));
     netif_set_default(&netif);
     netif_set_up(&netif);
+#if LWIP_IPV6
+    IP_ADDR6(&address6, PP_HTONL(0xFD000000), 0, 0, PP_HTONL(1));
+    netif_ip6_addr_set(&netif, 0, ip_2_ip6(&address6));
+    netif_ip6_addr_set_state(&netif, 0, IP6_ADDR_PREFERRED);
+#endif
     wire_plug();
 }
 

@@ -2,8 +2,8 @@
  *
  * The interface has the address 10.0.0.1, and its far end is the same lwIP: what is sent to
  * 10.0.0.2 comes back with both addresses swapped, as if 10.0.0.2 had sent it to 10.0.0.1. So a
- * connection to 10.0.0.2 reaches a listener of this program. All runs in the test's thread, as with
- * NO_SYS. */
+ * connection to 10.0.0.2 reaches a listener of this program, and so does one to fd00::2. All runs
+ * in the test's thread, as with NO_SYS. */
 #ifndef LWIP_WIRE_H
 #define LWIP_WIRE_H
 
@@ -15,6 +15,7 @@
 typedef struct wire {
     uint32_t ms;      /* the time that lwIP sees */
     ip_addr_t far;    /* 10.0.0.2 */
+    ip_addr_t far6;   /* fd00::2, if lwIP has IPv6 */
     uint8_t isCut;    /* packets vanish */
     uint16_t first;   /* bytes of data in the first pbuf of a received packet; 0: all */
     uint16_t others;  /* bytes in each of the others; 0: the rest */
