@@ -149,12 +149,44 @@ static int has_driver(model_fault fault)
     return (fault >= DRIVER_INVERTED && fault < DRIVER_EARLY) || fault == NO_FLUSH;
 }
 
-/* The port has this fault, and the test says this sentence and no other of its kind. */
+/* Puts a % in the place of each number. */
+static void drop_numbers(char *words)
+{
+    char *to = words;
+
+    while (*words != '\0') {
+        const size_t digits = strspn(words, "0123456789");
+
+        *to++ = digits > 0 ? '%' : *words;
+        words += digits > 0 ? digits : 1;
+    }
+    *to = '\0';
+}
+
+/* The same sentence, with other numbers. */
+static void finds_beside_tasks(model_fault fault, const char *sentence)
+{
+    model_uart uart = broken(fault);
+    char words[256];
+
+    strcpy(words, sentence);
+    drop_numbers(words);
+    uart.awayNs = 3000000;
+    for (uart.awayCalls = 977; uart.awayCalls < 9000; uart.awayCalls += 1103) {
+        prepare(uart, has_driver(fault));
+        assert_int_equal(mbm_portTest_run(&k.test), 1);
+        says(MBM_PORT_WRONG, words);
+    }
+}
+
+/* The port has this fault, and the test says this sentence and no other of its kind. It does so
+ * too if other tasks use the processor. */
 static void finds(model_fault fault, const char *sentence)
 {
     prepare(broken(fault), has_driver(fault));
     assert_int_equal(mbm_portTest_run(&k.test), 1);
     says(MBM_PORT_WRONG, sentence);
+    finds_beside_tasks(fault, sentence);
 }
 
 TEST_ROW(
@@ -506,6 +538,51 @@ TEST(a_driver_that_an_interrupt_switches_off_passes)
     uart.ownDriver = 1;
     for (uart.callNs = 5000; uart.callNs < 40000; uart.callNs += 500)
         run_right(uart, 1);
+}
+
+/* --- a processor that other tasks use too */
+
+/* The task of the test is away now and then, at another moment in each run. */
+static void run_beside_tasks(model_uart uart, int driver, void (*run)(model_uart uart, int driver))
+{
+    static const uint32_t milliseconds[] = {1, 4, 15, 60};
+
+    for (unsigned i = 0; i < COUNT(milliseconds); i++) {
+        uart.awayNs = milliseconds[i] * 1000000u;
+        for (uart.awayCalls = 401; uart.awayCalls < 6000; uart.awayCalls += 433)
+            run(uart, driver);
+    }
+}
+
+TEST(a_port_with_an_interrupt_passes_beside_other_tasks)
+{
+    run_beside_tasks(with_interrupt(), 1, run_right);
+}
+
+TEST(a_port_with_dma_passes_beside_other_tasks)
+{
+    run_beside_tasks(with_dma(), 1, run_right);
+}
+
+TEST(a_port_over_usb_passes_beside_other_tasks)
+{
+    run_beside_tasks(over_usb(), 0, run_right);
+}
+
+TEST(a_driver_that_an_interrupt_switches_off_passes_beside_other_tasks)
+{
+    model_uart uart = with_interrupt();
+
+    uart.ownDriver = 1;
+    run_beside_tasks(uart, 1, run_right);
+}
+
+TEST(a_uart_that_switches_the_driver_itself_passes_beside_other_tasks)
+{
+    model_uart uart = with_interrupt();
+
+    uart.ownDriver = 1;
+    run_beside_tasks(uart, 0, run_right);
 }
 
 /* Half a character is shorter than its tick. */

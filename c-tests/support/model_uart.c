@@ -85,6 +85,8 @@ static model_uart *called(void *context)
 
     m->calls++;
     m->now += m->callNs;
+    if (m->awayCalls > 0 && m->calls % m->awayCalls == 0)
+        m->now += m->awayNs;
     /* One clock for both ends. */
     if (m->wire != m) {
         m->wire->now = m->now;

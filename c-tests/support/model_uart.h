@@ -64,6 +64,8 @@ typedef struct model_uart {
     uint32_t idleChars; /* after this silence, in characters, it hands over fewer */
     uint8_t ownDriver;  /* the UART switches the driver itself */
     uint8_t holdsBack;  /* the sender waits while the receiver is full, as over USB and TCP */
+    uint32_t awayCalls; /* at each such number of calls the task is away */
+    uint64_t awayNs;    /* for so long; the UART works on */
     model_fault fault;
 
     uint64_t now, next; /* nanoseconds; the end of the character that leaves */

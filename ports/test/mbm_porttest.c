@@ -67,6 +67,17 @@ uint32_t mbm_portTest_since(const mbm_portTest *test, uint32_t then)
     return us < UINT32_MAX / 2 ? us : 0;
 }
 
+uint32_t mbm_portTest_step(const mbm_portTest *test)
+{
+    return test->reference != NULL ? test->exactUs : test->stepUs;
+}
+
+/* For 5 s, and twice at least. */
+uint8_t mbm_portTest_tries_again(const mbm_portTest *test, uint32_t began, uint8_t tries)
+{
+    return tries < 2 || (tries < TRIES && mbm_portTest_since(test, began) < 5000000u);
+}
+
 /* In eighths of a microsecond, so that no product is longer than 32 bits. */
 uint32_t mbm_portTest_characters(const mbm_portTest *test, uint16_t count)
 {
@@ -125,7 +136,7 @@ static void clear(mbm_portTest *test)
     test->wrong = test->advice = test->checks = test->leftOut = 0;
     test->longestBlock = 0;
     test->longestPauseUs = 0;
-    test->stepUs = test->yieldUs = 0;
+    test->stepUs = test->exactUs = test->yieldUs = 0;
     test->isOver = test->startsOn = 0;
 }
 

@@ -21,7 +21,7 @@
  * It needs a wire from the pin TX to the pin RX, with no transceiver between, or a second port at
  * the other end of the line. With neither it makes the checks that need no wire. It uses no heap,
  * no printf and no interrupt, runs in one task, and ends by itself, whatever the port does, unless
- * a hook never returns.
+ * a hook never returns. Other tasks may run beside it: what they delay is no fault of the port.
  *
  * Licence: MIT OR Apache-2.0.
  */
@@ -101,6 +101,7 @@ typedef struct mbm_portTest {
     uint32_t longestPauseUs;
 
     uint32_t stepUs;    /**< private */
+    uint32_t exactUs;   /**< private */
     uint32_t yieldUs;   /**< private */
     uint8_t isOver;     /**< private */
     uint8_t startsOn;   /**< private */

@@ -1,6 +1,113 @@
-/* The test of a port: the end of a frame, blocks, overruns. See mbm_porttest.h.
+/* The test of a port: frames, their end, blocks, overruns. See mbm_porttest.h.
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
+
+/* --- frames that are sent */
+
+/* Characters do not arrive before they can. */
+static uint8_t is_in_time(mbm_portTest *test, const passage *bytes)
+{
+    const uint32_t lasts = mbm_portTest_characters(test, bytes->length);
+
+    if (lasts == 0 || bytes->to == NULL || bytes->lastUs + lasts / 10 + test->stepUs >= lasts)
+        return 1;
+    SAY_NUMBERS(
+        test, MBM_PORT_WRONG,
+        "% characters took % us, and last % at % baud: the clock does not count microseconds, or the line has another "
+        "rate.",
+        bytes->length, bytes->lastUs, lasts, test->baud);
+    return 0;
+}
+
+/* A frame of a few bytes is taken, leaves and arrives. Without that nothing else can be tested. */
+static uint8_t can_send(mbm_portTest *test)
+{
+    passage few = mbm_portTest_sending(test, FEW);
+
+    test->checks++;
+    if (!mbm_portTest_pass(test, &few))
+        return 0;
+    if (few.taken < FEW)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`write` took % of % bytes and then none for a second: start the transmitter, and clear your mark of a "
+            "transmission under way when it has ended.",
+            few.taken, FEW);
+    else if (!few.isFlushed)
+        SAY(test, MBM_PORT_WRONG,
+            "`flush` returned 0 for a second: it must return 1 once the last bit has left. Start the interrupt or "
+            "read the flag that says so.");
+    else if (mbm_portTest_have_arrived(test, &few) && is_in_time(test, &few))
+        return !test->isOver;
+    test->isOver = 1;
+    return 0;
+}
+
+/* Returns whether the longest frame was sent. */
+static uint8_t can_send_all(mbm_portTest *test, passage *all)
+{
+    *all = mbm_portTest_sending(test, 256);
+    if (!mbm_portTest_pass(test, all))
+        return 0;
+    if (all->taken == 0)
+        SAY(test, MBM_PORT_WRONG,
+            "`write` took none of 256 bytes for a second, after a frame of 8: clear your mark of a transmission under way "
+            "when it has ended, and take part of a frame that is longer than your buffer.");
+    else if (all->taken < all->length || !all->isFlushed)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "Of a frame of 256 bytes `write` took %, and then nothing left for a second: take part of the bytes, "
+            "return their number, and take the others later.",
+            all->taken);
+    else if (mbm_portTest_have_arrived(test, all))
+        return !test->isOver;
+    test->isOver = 1;
+    return 0;
+}
+
+void mbm_portTest_checkWrite(mbm_portTest *test)
+{
+    const uint32_t lasts = mbm_portTest_characters(test, 256), may_wait = lasts / 4 + 1000,
+                   may_last = 2 * lasts + 50000;
+    uint32_t began, longest_write = UINT32_MAX, last = UINT32_MAX;
+    passage all;
+    uint8_t tries = 0, is_long;
+
+    if (!can_send(test))
+        return;
+    test->checks++;
+    began = mbm_portTest_now(test);
+    do {
+        if (!can_send_all(test, &all))
+            return;
+        tries++;
+        if (all.longestWriteUs < longest_write)
+            longest_write = all.longestWriteUs;
+        if (all.lastUs < last)
+            last = all.lastUs;
+        is_long = lasts > 0 && ((longest_write > may_wait && !test->mayWait) || last > may_last);
+    } while (is_long && mbm_portTest_tries_again(test, began, tries));
+    if (lasts > 0 && longest_write > may_wait && !test->mayWait)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "`write` waited for % us: hand the bytes to an interrupt, to DMA or to a transmit buffer, and return "
+            "the number that was taken.",
+            longest_write);
+    else if (all.atOnce < 256 && !test->mayWait)
+        SAY_NUMBERS(
+            test, MBM_PORT_ADVICE,
+            "`write` takes at most % of 256 bytes at once: a frame gets a pause if the main loop is away for longer "
+            "than they last. A transmit buffer of 256 bytes prevents that.",
+            all.atOnce);
+    if (all.to != NULL && !is_in_time(test, &all))
+        test->isOver = 1;
+    else if (lasts > 0 && last > may_last)
+        SAY_NUMBERS(
+            test, MBM_PORT_WRONG,
+            "256 characters took % us, and last % at % baud: the clock does not count microseconds, the line "
+            "has another rate, or the frame has pauses.",
+            last, lasts, test->baud);
+}
 
 /* --- the end of a frame */
 
@@ -12,17 +119,45 @@ static uint32_t reply_may_begin(const mbm_portTest *test)
     return us > 1750 ? us : 1750;
 }
 
-static void judge_flush(mbm_portTest *test, uint32_t shortest)
+static uint32_t least(uint32_t one, uint32_t other)
 {
+    return one < other ? one : other;
+}
+
+static uint32_t most(uint32_t one, uint32_t other)
+{
+    return one > other ? one : other;
+}
+
+/* Flush returned 0 when the last bit had left long before, or it waited for so long. In a call that
+ * waits the task may be away for another reason, and the shortest counts. */
+static uint8_t is_flush_late(const mbm_portTest *test, const passage *few)
+{
+    const uint32_t may =
+        mbm_portTest_characters(test, FEW) + reply_may_begin(test) + mbm_portTest_step(test);
+
+    return few->askedUs > may || few->waitedUs > may;
+}
+
+/* Whether the driver cannot have been on for the length of a frame without being seen. */
+static uint8_t is_seen(const mbm_portTest *test, const passage *few)
+{
+    return test->port->preTransmission != NULL ||
+           few->unseenUs + mbm_portTest_step(test) < mbm_portTest_characters(test, FEW - 1);
+}
+
+static void judge_flush(mbm_portTest *test, const passage *few)
+{
+    const uint32_t shortest = few->flushedUs;
     const uint32_t lasts = mbm_portTest_characters(test, FEW),
                    half = mbm_portTest_characters(test, 1) / 2;
 
-    if (test->reference == NULL && test->stepUs > half) {
+    if (mbm_portTest_step(test) > half) {
         SAY_NUMBERS(
             test, MBM_PORT_LEFT_OUT,
             "Whether `flush` is exact was not measured: half a character lasts % us, and the clock moves in steps of "
             "%. Set `reference`, or test at a lower rate.",
-            half, test->stepUs);
+            half, mbm_portTest_step(test));
         return;
     }
     test->checks++;
@@ -32,7 +167,7 @@ static void judge_flush(mbm_portTest *test, uint32_t shortest)
             "`flush` returned 1 after % us, and % characters last %: it must wait for the last bit. Ask for "
             "transmission complete, not for an empty register, FIFO or DMA.",
             shortest, FEW, lasts);
-    else if (shortest > lasts + reply_may_begin(test) + test->yieldUs)
+    else if (is_flush_late(test, few))
         SAY_NUMBERS(
             test, MBM_PORT_WRONG,
             "`flush` returned 1 % us after the last bit: a device may reply before, and the driver is still on. Ask "
@@ -49,6 +184,9 @@ static void judge_driver(mbm_portTest *test, const passage *few)
     else if (test->startsOn)
         SAY(test, MBM_PORT_WRONG,
             "The driver is on before the first frame: switch its pin off when the port begins.");
+    else if (!few->wentOn && !is_seen(test, few))
+        SAY(test, MBM_PORT_LEFT_OUT,
+            "Whether the driver goes on was not seen: nobody looked at its pin while the bytes left.");
     else if (!few->wentOn)
         SAY(test, MBM_PORT_WRONG,
             "The driver did not go on for a frame: make its pin an output, look at its number and its level, and at "
@@ -65,19 +203,48 @@ static void judge_driver(mbm_portTest *test, const passage *few)
             "transmission complete.");
 }
 
+/* The shorter times of two frames, and whatever was seen of the driver. */
+static passage both(const passage *one, const passage *other)
+{
+    passage sum = *other;
+
+    sum.flushedUs = least(one->flushedUs, other->flushedUs);
+    sum.switchedUs = least(one->switchedUs, other->switchedUs);
+    sum.waitedUs = least(one->waitedUs, other->waitedUs);
+    sum.askedUs = most(one->askedUs, other->askedUs);
+    sum.unseenUs = least(one->unseenUs, other->unseenUs);
+    sum.wentOn |= one->wentOn;
+    sum.staysOn |= one->staysOn;
+    if (one->wentOff) {
+        sum.wentOff = 1;
+        sum.offUs = one->offUs;
+    }
+    return sum;
+}
+
+/* Whether another frame may show that the port is right. */
+static uint8_t is_unclear(const mbm_portTest *test, const passage *few)
+{
+    return (test->baud != 0 && test->port->flush != NULL && is_flush_late(test, few)) ||
+           few->switchedUs > NO_WAIT + test->stepUs ||
+           (test->driver != NULL && !few->wentOn && !is_seen(test, few));
+}
+
 void mbm_portTest_checkFlush(mbm_portTest *test)
 {
     const mbm_port *port = test->port;
-    uint32_t shortest = UINT32_MAX, switched = UINT32_MAX;
+    const uint32_t began = mbm_portTest_now(test);
     passage few = {0};
-    uint8_t i;
+    uint8_t tries;
 
-    for (i = 0; i < 3; i++) {
-        few = mbm_portTest_sending(test, FEW);
-        if (!mbm_portTest_pass(test, &few))
+    for (tries = 0;
+         tries < 3 || (is_unclear(test, &few) && mbm_portTest_tries_again(test, began, tries));
+         tries++) {
+        passage again = mbm_portTest_sending(test, FEW);
+
+        if (!mbm_portTest_pass(test, &again))
             return;
-        shortest = few.flushedUs < shortest ? few.flushedUs : shortest;
-        switched = few.switchedUs < switched ? few.switchedUs : switched;
+        few = tries == 0 ? again : both(&few, &again);
     }
     if (port->flush == NULL && port->postTransmission != NULL && !test->mayWait)
         SAY(test, MBM_PORT_WRONG,
@@ -90,13 +257,13 @@ void mbm_portTest_checkFlush(mbm_portTest *test)
         SAY(test, MBM_PORT_LEFT_OUT,
             "Whether `flush` is exact was not measured: set `baud`, if the line has a rate.");
     else
-        judge_flush(test, shortest);
-    if (switched > NO_WAIT + test->stepUs)
+        judge_flush(test, &few);
+    if (few.switchedUs > NO_WAIT + test->stepUs)
         SAY_NUMBERS(
             test, MBM_PORT_WRONG,
             "`preTransmission` or `postTransmission` waited for % us: switch the pin and return; flush and "
             "mbm_line_setPostFlushHold wait for the last bit.",
-            switched);
+            few.switchedUs);
     if (test->driver != NULL)
         judge_driver(test, &few);
     else
@@ -118,14 +285,15 @@ static uint32_t lateness(const mbm_portTest *test, const passage *bytes)
     return end > pause ? end : pause;
 }
 
-/* How late bytes come, and which setting suits that. */
-static void advise(mbm_portTest *test, uint32_t late)
+/* How late bytes come, of which the test itself is away for some time, and which setting suits
+ * that. */
+static void advise(mbm_portTest *test, uint32_t late, uint32_t yields)
 {
     const uint16_t block = test->longestBlock;
 
     if (test->baud == 0)
         SAY_NUMBERS(test, MBM_PORT_FACT, "Bytes arrive in blocks of up to %.", block);
-    else if (late <= reply_may_begin(test) + test->stepUs + test->yieldUs)
+    else if (late <= reply_may_begin(test) + mbm_portTest_step(test) + yields)
         SAY_NUMBERS(
             test, MBM_PORT_FACT,
             "Bytes arrive in blocks of up to %, at most % us late: no setting of mbm needs a change.",
@@ -181,24 +349,23 @@ static uint8_t check_blocks(mbm_portTest *test)
 {
     static const uint8_t lengths[] = {FEW, 3, 29, 17};
     passage all = mbm_portTest_receiving(test, 256);
-    uint32_t late;
+    uint32_t late = 0, yields = 0;
     uint8_t i;
 
     test->checks++;
-    for (i = 0, late = 0; i < sizeof lengths; i++) {
+    for (i = 0; i < sizeof lengths; i++) {
         passage few = mbm_portTest_receiving(test, lengths[i]);
-        uint32_t us;
 
         if (!mbm_portTest_pass(test, &few) || !mbm_portTest_have_arrived(test, &few))
             return 0;
-        us = lateness(test, &few);
-        late = us > late ? us : late;
+        late = most(late, lateness(test, &few));
+        yields = most(yields, few.yieldUs);
     }
     if (!mbm_portTest_pass(test, &all) || !mbm_portTest_have_arrived(test, &all))
         return 0;
     test->longestBlock = all.longestBlock;
     test->longestPauseUs = all.longestPauseUs;
-    advise(test, late > lateness(test, &all) ? late : lateness(test, &all));
+    advise(test, most(late, lateness(test, &all)), most(yields, all.yieldUs));
     return 1;
 }
 

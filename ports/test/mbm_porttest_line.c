@@ -14,6 +14,9 @@ enum { SPACE = 64 };
 enum { SPACE = 300 };
 #endif
 
+/* While the task of the test is away, nobody asks the port: of such a time so much counts. */
+#define MOST_OF_A_TURN (PATIENCE / 8)
+
 /* A byte that no read may change. */
 enum { UNTOUCHED = 0x5C };
 
@@ -92,18 +95,24 @@ uint8_t mbm_portTest_drain(mbm_portTest *test, const mbm_port *port)
 {
     const uint32_t began = mbm_portTest_now(test), rest = 20000u + mbm_portTest_characters(test, 4);
     uint32_t last = began;
-    uint8_t space[SPACE];
+    uint8_t space[SPACE], reads = 0;
 
-    while (mbm_portTest_since(test, last) < rest) {
+    for (;;) {
+        const uint32_t silence = mbm_portTest_since(test, last);
         const int16_t count = take(test, port, space, CAPACITY);
 
         if (test->isOver)
             return 0;
         if (count < 0)
             return is_lost(test);
+        /* What came while the task was away has been read. */
+        if (count == 0 && silence >= rest)
+            return 1;
         if (count > 0) {
             last = mbm_portTest_now(test);
-            if (last - began > 3 * PATIENCE) {
+            if (reads < 64) {
+                reads++;
+            } else if (last - began > 3 * PATIENCE) {
                 test->isOver = 1;
                 SAY(test, MBM_PORT_WRONG,
                     "`read` returns bytes without end although nothing is sent: return 0 when the ring is empty; give "
@@ -113,7 +122,6 @@ uint8_t mbm_portTest_drain(mbm_portTest *test, const mbm_port *port)
         }
         mbm_portTest_yield(test);
     }
-    return 1;
 }
 
 /* --- one passage */
@@ -121,10 +129,27 @@ uint8_t mbm_portTest_drain(mbm_portTest *test, const mbm_port *port)
 /* What a passage knows of time. */
 typedef struct times {
     uint32_t began;
-    uint32_t progress; /* the last time that a byte moved */
+    uint32_t takenAt;  /* the end of the last write */
+    uint32_t turnAt;   /* the begin of this turn of the loop */
+    uint32_t waited;   /* since a byte moved */
     uint32_t sure;     /* so long after it the last bit has surely not left; 0: not known */
     uint32_t readAt;   /* of the last byte */
+    uint32_t lookedAt; /* at the pin of the driver */
 } times;
+
+static void note_progress(const mbm_portTest *test, times *when)
+{
+    when->turnAt = mbm_portTest_now(test);
+    when->waited = 0;
+}
+
+static void end_turn(const mbm_portTest *test, times *when)
+{
+    const uint32_t us = mbm_portTest_since(test, when->turnAt);
+
+    when->turnAt = mbm_portTest_now(test);
+    when->waited += us < MOST_OF_A_TURN ? us : MOST_OF_A_TURN;
+}
 
 /* The most bytes of one call. While a write waits, nothing is read: the receiver must hold what
  * comes. */
@@ -153,7 +178,8 @@ static void send(mbm_portTest *test, passage *bytes, times *when)
     }
     if (count == 0)
         return;
-    when->progress = before + took;
+    note_progress(test, when);
+    when->takenAt = when->turnAt;
     bytes->taken = (uint16_t)(bytes->taken + (uint16_t)count);
     if ((uint16_t)count > bytes->atOnce)
         bytes->atOnce = (uint16_t)count;
@@ -162,6 +188,12 @@ static void send(mbm_portTest *test, passage *bytes, times *when)
         test->frame[at + i] = (uint8_t)~test->frame[at + i];
     if (bytes->taken % 256u == 0)
         fill(test);
+}
+
+/* Whether the pin of the driver of the port that sends can be read. */
+static uint8_t has_pin(const mbm_portTest *test, const passage *bytes)
+{
+    return test->driver != NULL && bytes->from == test->port;
 }
 
 /* Calls a hook of the driver. */
@@ -178,27 +210,47 @@ static void switch_driver(mbm_portTest *test, passage *bytes, void (*hook)(void 
         bytes->switchedUs = took;
 }
 
+/* The pin was not looked at since the last look. */
+static void note_unseen(const mbm_portTest *test, passage *bytes, const times *when)
+{
+    const uint32_t us = mbm_portTest_since(test, when->lookedAt);
+
+    if (us > bytes->unseenUs)
+        bytes->unseenUs = us;
+}
+
 static void end(mbm_portTest *test, passage *bytes, times *when)
 {
     const mbm_port *port = bytes->from;
+    const uint32_t asked = mbm_portTest_now(test);
 
-    if (port->flush != NULL && !port->flush(port->context))
+    if (port->flush != NULL && !port->flush(port->context)) {
+        bytes->askedUs = asked - when->takenAt;
         return;
+    }
     bytes->isFlushed = 1;
-    when->progress = mbm_portTest_now(test);
     bytes->flushedUs = mbm_portTest_since(test, when->began);
+    if (mbm_portTest_since(test, asked) > NO_WAIT + mbm_portTest_step(test))
+        bytes->waitedUs = bytes->flushedUs;
+    note_unseen(test, bytes, when);
+    note_progress(test, when);
     switch_driver(test, bytes, port->postTransmission);
 }
 
 /* The pin, while the bytes leave. It is read before the clock: the task may be away between them,
  * and the driver goes off rightly meanwhile. */
-static void watch_driver(mbm_portTest *test, passage *bytes, const times *when)
+static void watch_driver(mbm_portTest *test, passage *bytes, times *when)
 {
+    const uint32_t before = mbm_portTest_now(test);
+    uint8_t is_on;
     uint32_t us;
 
-    if (test->driver == NULL || bytes->from != test->port || bytes->isFlushed)
+    if (!has_pin(test, bytes) || bytes->isFlushed)
         return;
-    if (test->driver(test->context)) {
+    is_on = test->driver(test->context);
+    note_unseen(test, bytes, when);
+    when->lookedAt = before;
+    if (is_on) {
         bytes->wentOn = 1;
         return;
     }
@@ -249,11 +301,11 @@ static void receive(mbm_portTest *test, passage *bytes, times *when)
         return;
     }
     compare(test, bytes, space, (uint16_t)count);
-    when->progress = mbm_portTest_now(test);
+    note_progress(test, when);
     pause = mbm_portTest_since(test, when->readAt);
     if (bytes->block == 0 && bytes->lastUs > 0 && pause > bytes->longestPauseUs)
         bytes->longestPauseUs = pause;
-    when->readAt = when->progress;
+    when->readAt = when->turnAt;
     bytes->lastUs = mbm_portTest_since(test, when->began);
     bytes->block = (uint16_t)(bytes->block + (uint16_t)count);
     if (bytes->block > bytes->longestBlock)
@@ -269,8 +321,15 @@ static uint8_t is_done(const passage *bytes)
 static uint8_t waits_for_bytes(const mbm_portTest *test, const passage *bytes, const times *when)
 {
     return piece(test, bytes) < 256 && !bytes->isAway &&
-           bytes->arrived + piece(test, bytes) < bytes->taken &&
-           mbm_portTest_since(test, when->progress) < PATIENCE / 2;
+           bytes->arrived + piece(test, bytes) < bytes->taken && when->waited < PATIENCE / 2;
+}
+
+/* A flush may wait until the last bit has left. A UART that switches its driver itself is looked at
+ * before. */
+static uint8_t waits_for_driver(const mbm_portTest *test, const passage *bytes, const times *when)
+{
+    return has_pin(test, bytes) && bytes->from->preTransmission == NULL && !bytes->wentOn &&
+           mbm_portTest_since(test, when->began) < mbm_portTest_characters(test, bytes->length) / 2;
 }
 
 /* Goes on until all has been done, or nothing happens any more. */
@@ -281,68 +340,87 @@ static void move(mbm_portTest *test, passage *bytes)
     const uint32_t lasts = mbm_portTest_characters(test, bytes->length),
                    patience = PATIENCE + lasts,
                    /* The clock shows up to a step less than has passed. */
-        margin = mbm_portTest_characters(test, 1) / 2 + test->stepUs;
-    times when = {
-        .began = now, .progress = now, .sure = lasts > margin ? lasts - margin : 0, .readAt = now};
+        margin = mbm_portTest_characters(test, 1) / 2 + mbm_portTest_step(test);
+    times when = {.began = now,
+                  .turnAt = now,
+                  .sure = lasts > margin ? lasts - margin : 0,
+                  .readAt = now,
+                  .lookedAt = now};
 
-    while (!test->isOver && !is_done(bytes) && mbm_portTest_since(test, when.progress) < patience) {
+    test->yieldUs = 0;
+    while (!test->isOver && !is_done(bytes) && when.waited < patience) {
         if (bytes->taken < bytes->length)
             send(test, bytes, &when);
-        else if (!bytes->isFlushed && !waits_for_bytes(test, bytes, &when))
+        else if (!bytes->isFlushed && !waits_for_bytes(test, bytes, &when) &&
+                 !waits_for_driver(test, bytes, &when))
             end(test, bytes, &when);
         watch_driver(test, bytes, &when);
         /* A line that holds the sender back waits for the reader. */
-        if (mbm_portTest_since(test, when.progress) > patience - PATIENCE / 2)
+        if (when.waited > patience - PATIENCE / 2)
             bytes->isAway = 0;
         if (!test->isOver && bytes->to != NULL && (!bytes->isAway || bytes->isFlushed))
             receive(test, bytes, &when);
         mbm_portTest_yield(test);
+        end_turn(test, &when);
     }
+    bytes->yieldUs = test->yieldUs;
 }
 
 /* A device may reply 3.5 characters after the last bit. A UART that switches the pin itself may
- * hold it for some bits. */
-static uint8_t stays_on(mbm_portTest *test)
+ * hold it for some bits. Without a flush the bytes may still be leaving. */
+static uint8_t stays_on(mbm_portTest *test, const passage *bytes)
 {
-    const uint32_t ended = mbm_portTest_now(test),
-                   may = mbm_portTest_characters(test, 2) + test->stepUs + test->yieldUs;
+    const uint32_t ended = mbm_portTest_now(test);
+    const uint32_t bits = test->baud != 0 ? mbm_portTest_characters(test, 2) : PATIENCE / 10;
+    const uint32_t rest =
+        bytes->from->flush == NULL ? mbm_portTest_characters(test, bytes->taken) : 0;
 
-    while (test->driver(test->context)) {
-        if (mbm_portTest_since(test, ended) > may)
+    for (;;) {
+        const uint32_t us = mbm_portTest_since(test, ended);
+
+        if (!test->driver(test->context))
+            return 0;
+        if (us > bits + rest + mbm_portTest_step(test))
             return 1;
         mbm_portTest_yield(test);
     }
-    return 0;
 }
 
 uint8_t mbm_portTest_pass(mbm_portTest *test, passage *bytes)
 {
     const mbm_port *from = bytes->from;
-    const uint8_t has_pin = test->driver != NULL && from == test->port;
 
     test->seed = (uint8_t)(test->seed + 59u);
     fill(test);
     if (!mbm_portTest_drain(test, test->port) ||
         (test->other != NULL && !mbm_portTest_drain(test, test->other)))
         return 0;
-    if (has_pin)
+    if (has_pin(test, bytes))
         bytes->wasOn = test->driver(test->context);
     switch_driver(test, bytes, from->preTransmission);
-    if (has_pin && from->preTransmission != NULL)
+    if (has_pin(test, bytes) && from->preTransmission != NULL)
         bytes->wentOn = test->driver(test->context);
     move(test, bytes);
     if (!bytes->isFlushed)
         switch_driver(test, bytes, from->postTransmission);
-    if (has_pin)
-        bytes->staysOn = stays_on(test);
+    if (has_pin(test, bytes))
+        bytes->staysOn = stays_on(test, bytes);
     return !test->isOver;
 }
 
 uint8_t mbm_portTest_is_alive(mbm_portTest *test)
 {
-    passage bytes = mbm_portTest_receiving(test, FEW);
+    uint8_t tries;
 
-    return mbm_portTest_pass(test, &bytes) && bytes.right == FEW && bytes.arrived == FEW;
+    for (tries = 0; tries < 3; tries++) {
+        passage bytes = mbm_portTest_receiving(test, FEW);
+
+        if (!mbm_portTest_pass(test, &bytes))
+            return 0;
+        if (bytes.right == FEW && bytes.arrived == FEW)
+            return 1;
+    }
+    return 0;
 }
 
 /* --- what is wrong with bytes */
@@ -429,97 +507,4 @@ uint8_t mbm_portTest_have_arrived(mbm_portTest *test, passage *bytes)
             "ring), or `write` returned more than it took.",
             before, length);
     return 0;
-}
-
-/* --- the checks */
-
-/* Characters do not arrive before they can. */
-static uint8_t is_in_time(mbm_portTest *test, const passage *bytes)
-{
-    const uint32_t lasts = mbm_portTest_characters(test, bytes->length);
-
-    if (lasts == 0 || bytes->to == NULL || bytes->lastUs + lasts / 10 + test->stepUs >= lasts)
-        return 1;
-    SAY_NUMBERS(
-        test, MBM_PORT_WRONG,
-        "% characters took % us, and last % at % baud: the clock does not count microseconds, or the line has another "
-        "rate.",
-        bytes->length, bytes->lastUs, lasts, test->baud);
-    return 0;
-}
-
-/* A frame of a few bytes is taken, leaves and arrives. Without that nothing else can be tested. */
-static uint8_t can_send(mbm_portTest *test)
-{
-    passage few = mbm_portTest_sending(test, FEW);
-
-    test->checks++;
-    if (!mbm_portTest_pass(test, &few))
-        return 0;
-    if (few.taken < FEW)
-        SAY_NUMBERS(
-            test, MBM_PORT_WRONG,
-            "`write` took % of % bytes and then none for a second: start the transmitter, and clear your mark of a "
-            "transmission under way when it has ended.",
-            few.taken, FEW);
-    else if (!few.isFlushed)
-        SAY(test, MBM_PORT_WRONG,
-            "`flush` returned 0 for a second: it must return 1 once the last bit has left. Start the interrupt or "
-            "read the flag that says so.");
-    else if (mbm_portTest_have_arrived(test, &few) && is_in_time(test, &few))
-        return !test->isOver;
-    test->isOver = 1;
-    return 0;
-}
-
-void mbm_portTest_checkWrite(mbm_portTest *test)
-{
-    passage all = mbm_portTest_sending(test, 256);
-    const uint32_t lasts = mbm_portTest_characters(test, 256);
-
-    if (!can_send(test))
-        return;
-    test->checks++;
-    if (!mbm_portTest_pass(test, &all))
-        return;
-    if (all.taken == 0) {
-        test->isOver = 1;
-        SAY(test, MBM_PORT_WRONG,
-            "`write` took none of 256 bytes for a second, after a frame of 8: clear your mark of a transmission under way "
-            "when it has ended, and take part of a frame that is longer than your buffer.");
-        return;
-    }
-    if (all.taken < all.length || !all.isFlushed) {
-        test->isOver = 1;
-        SAY_NUMBERS(
-            test, MBM_PORT_WRONG,
-            "Of a frame of 256 bytes `write` took %, and then nothing left for a second: take part of the bytes, "
-            "return their number, and take the others later.",
-            all.taken);
-        return;
-    }
-    if (all.to != NULL && !mbm_portTest_have_arrived(test, &all)) {
-        test->isOver = 1;
-        return;
-    }
-    if (lasts > 0 && all.longestWriteUs > lasts / 4 + 1000 && !test->mayWait)
-        SAY_NUMBERS(
-            test, MBM_PORT_WRONG,
-            "`write` waited for % us: hand the bytes to an interrupt, to DMA or to a transmit buffer, and return "
-            "the number that was taken.",
-            all.longestWriteUs);
-    else if (all.atOnce < 256 && !test->mayWait)
-        SAY_NUMBERS(
-            test, MBM_PORT_ADVICE,
-            "`write` takes at most % of 256 bytes at once: a frame gets a pause if the main loop is away for longer "
-            "than they last. A transmit buffer of 256 bytes prevents that.",
-            all.atOnce);
-    if (all.to != NULL && !is_in_time(test, &all))
-        test->isOver = 1;
-    else if (lasts > 0 && all.to != NULL && all.lastUs > 2 * lasts + 50000)
-        SAY_NUMBERS(
-            test, MBM_PORT_WRONG,
-            "256 characters took % us, and last % at % baud: the clock does not count microseconds, the line "
-            "has another rate, or the frame has pauses.",
-            all.lastUs, lasts, test->baud);
 }

@@ -17,6 +17,10 @@
 /* Microseconds: the longest time that a hook may take in which it does not wait. */
 enum { NO_WAIT = 500 };
 
+/* How often a time that is too long is measured: other work of the processor makes many too long.
+ */
+enum { TRIES = 64 };
+
 /* A short frame, as most requests are. */
 enum { FEW = 8 };
 
@@ -42,7 +46,9 @@ typedef struct passage {
     uint32_t longestWriteUs; /* of one call */
     /* From the first call of write on. */
     uint32_t flushedUs; /* until flush returned 1 */
+    uint32_t waitedUs;  /* the same, if that call waited; else 0 */
     uint32_t lastUs;    /* until the last byte arrived */
+    uint32_t askedUs;   /* from the last write until the last call of flush that returned 0 */
     /* The driver. */
     uint32_t switchedUs; /* the longest call of one of its hooks */
     uint8_t wasOn;       /* before */
@@ -50,6 +56,8 @@ typedef struct passage {
     uint8_t staysOn;     /* afterwards */
     uint8_t wentOff;     /* before the last bit */
     uint32_t offUs;      /* when */
+    uint32_t unseenUs;   /* the longest time between two looks at its pin, and until flush is 1 */
+    uint32_t yieldUs;    /* the longest call of yield */
 } passage;
 
 /* --- mbm_porttest.c */
@@ -67,6 +75,12 @@ void mbm_portTest_say(mbm_portTest *test, mbm_portFinding kind, const char *word
 uint32_t mbm_portTest_now(const mbm_portTest *test);
 
 uint32_t mbm_portTest_since(const mbm_portTest *test, uint32_t then);
+
+/* The shortest step of that time. */
+uint32_t mbm_portTest_step(const mbm_portTest *test);
+
+/* Whether a time that was too long is measured again, after some tries since `began`. */
+uint8_t mbm_portTest_tries_again(const mbm_portTest *test, uint32_t began, uint8_t tries);
 
 /* How many microseconds `count` characters last; 0 without a baud rate. */
 uint32_t mbm_portTest_characters(const mbm_portTest *test, uint16_t count);
@@ -92,13 +106,13 @@ uint8_t mbm_portTest_pass(mbm_portTest *test, passage *bytes);
 /* Returns whether the bytes arrived as they were sent, or there is no wire; says why if not. */
 uint8_t mbm_portTest_have_arrived(mbm_portTest *test, passage *bytes);
 
-/* Returns whether a few bytes arrive as they are sent. */
+/* Returns whether a few bytes arrive as they are sent, in one of some tries: bytes that were sent
+ * before may come late. */
 uint8_t mbm_portTest_is_alive(mbm_portTest *test);
-
-void mbm_portTest_checkWrite(mbm_portTest *test);
 
 /* --- mbm_porttest_checks.c */
 
+void mbm_portTest_checkWrite(mbm_portTest *test);
 void mbm_portTest_checkFlush(mbm_portTest *test);
 void mbm_portTest_checkWire(mbm_portTest *test);
 
