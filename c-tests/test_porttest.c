@@ -585,6 +585,41 @@ TEST(a_uart_that_switches_the_driver_itself_passes_beside_other_tasks)
     run_beside_tasks(uart, 0, run_right);
 }
 
+/* Whenever the task wakes, another one runs first. */
+TEST(no_sleep_is_judged_where_other_tasks_always_delay_it)
+{
+    model_uart uart = with_interrupt();
+
+    uart.flushWaits = 1;
+    run_right(uart, 1);
+    uart.awayCalls = 301;
+    uart.awayNs = uart.wakesNs = 4000000;
+    run_right(uart, 1);
+    says(
+        MBM_PORT_LEFT_OUT,
+        "Whether `flush` is late was not measured: other tasks take the processor for % us at a time.");
+    says(
+        MBM_PORT_LEFT_OUT,
+        "Whether `idle` sleeps too long was not measured: other tasks take the processor for % us at a time.");
+}
+
+/* Nothing else runs: the port itself sleeps too long. */
+TEST(a_sleep_that_is_always_too_long_is_wrong)
+{
+    model_uart uart = with_interrupt();
+
+    uart.flushWaits = 1;
+    uart.wakesNs = 4000000;
+    prepare(uart, 1);
+    assert_int_equal(mbm_portTest_run(&k.test), 2);
+    says(
+        MBM_PORT_WRONG,
+        "`flush` returned 1 % us after the last bit: a device may reply before, and the driver is still on. Ask for transmission complete.");
+    says(
+        MBM_PORT_WRONG,
+        "`idle` slept at least % us longer than mbm_node_pollDelay allowed: round ticks down, and do not sleep for less than one.");
+}
+
 /* Half a character is shorter than its tick. */
 TEST(a_port_with_a_tick_of_a_millisecond_passes)
 {

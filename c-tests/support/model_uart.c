@@ -181,8 +181,13 @@ static uint32_t port_micros(void *context)
 
 static uint8_t port_flush(void *context)
 {
-    const model_uart *m = called(context);
+    model_uart *m = called(context);
 
+    if (m->flushWaits && m->leavingCount > 0) {
+        while (m->leavingCount > 0)
+            (void)called(m);
+        m->now += m->wakesNs;
+    }
     if (m->fault == FLUSH_NEVER)
         return 0;
     if (m->fault == FLUSH_AT_ONCE)
@@ -221,6 +226,7 @@ static void port_idle(void *context, mbm_node *node)
 
     while (m->now + m->callNs <= until && (m->heldCount == 0 || m->fault == IDLE_DEAF))
         (void)called(m);
+    m->now += m->wakesNs;
 }
 
 mbm_port model_port(model_uart *m, int driver)

@@ -66,6 +66,8 @@ typedef struct model_uart {
     uint8_t holdsBack;  /* the sender waits while the receiver is full, as over USB and TCP */
     uint32_t awayCalls; /* at each such number of calls the task is away */
     uint64_t awayNs;    /* for so long; the UART works on */
+    uint64_t wakesNs;   /* so late the task wakes from a sleep */
+    uint8_t flushWaits; /* flush sleeps until the last bit has left */
     model_fault fault;
 
     uint64_t now, next; /* nanoseconds; the end of the character that leaves */

@@ -78,6 +78,20 @@ uint8_t mbm_portTest_tries_again(const mbm_portTest *test, uint32_t began, uint8
     return tries < 2 || (tries < TRIES && mbm_portTest_since(test, began) < 5000000u);
 }
 
+uint32_t mbm_portTest_away(const mbm_portTest *test)
+{
+    const uint32_t began = mbm_portTest_now(test), step = mbm_portTest_step(test);
+    uint32_t before = began, longest = 0, now;
+
+    do {
+        now = mbm_portTest_now(test);
+        if (now - before > longest && now - before < UINT32_MAX / 2)
+            longest = now - before;
+        before = now;
+    } while (mbm_portTest_since(test, began) < 200000u);
+    return longest > step ? longest - step : 0;
+}
+
 /* In eighths of a microsecond, so that no product is longer than 32 bits. */
 uint32_t mbm_portTest_characters(const mbm_portTest *test, uint16_t count)
 {

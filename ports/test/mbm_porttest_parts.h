@@ -82,6 +82,10 @@ uint32_t mbm_portTest_step(const mbm_portTest *test);
 /* Whether a time that was too long is measured again, after some tries since `began`. */
 uint8_t mbm_portTest_tries_again(const mbm_portTest *test, uint32_t began, uint8_t tries);
 
+/* Returns for how long other tasks take the processor at a time, as the clock shows in a fifth of a
+ * second. A task that sleeps may wake so much later. */
+uint32_t mbm_portTest_away(const mbm_portTest *test);
+
 /* How many microseconds `count` characters last; 0 without a baud rate. */
 uint32_t mbm_portTest_characters(const mbm_portTest *test, uint16_t count);
 
