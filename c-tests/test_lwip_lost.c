@@ -248,6 +248,23 @@ TEST(a_cable_that_is_pulled_during_a_request_ends_it_and_repeats_it_never)
     client_reads();
 }
 
+TEST(a_new_address_of_the_interface_costs_the_connections_alone)
+{
+    IS(MBM_PENDING, mbm_lwip_open(&device, &the_wire.far, PORT));
+    begin_link();
+    client_reads();
+    wire_readdress(9);
+    IS(MBM_LINK_LOST, mbm_lwip_status(&device));
+    assert_int_equal(device.error, ERR_ABRT);
+    client_reads();
+    client_queue(REGISTERS);
+    only_poll();
+    wire_readdress(1);
+    IS(MBM_LINK_LOST, ended(1000));
+    client_reads();
+    assert_int_equal(ends, 2);
+}
+
 /* A switch between the two has no power: nothing comes back, and the interface stays up. */
 TEST(a_network_that_swallows_all_is_a_response_timed_out_and_then_works_again)
 {

@@ -204,3 +204,11 @@ void wire_plug(void)
 {
     netif_set_link_up(&netif);
 }
+
+void wire_readdress(uint8_t last)
+{
+    ip4_addr_t address;
+
+    IP4_ADDR(&address, 10, 0, 0, last);
+    netif_set_ipaddr(&netif, &address);
+}

@@ -45,4 +45,7 @@ void wire_pass(uint32_t ms, void (*each)(void));
 void wire_unplug(void);
 void wire_plug(void);
 
+/* Gives the interface another address, 10.0.0.`last`, as DHCP may do. */
+void wire_readdress(uint8_t last);
+
 #endif
