@@ -134,11 +134,11 @@ address: ## Write the address of packaging/project.toml into the links to releas
 PAGE_PROGRAMS := $(EXAMPLES:%=$(BUILD)/plain/linux/%) $(BUILD)/plain/mbm $(SERVE) $(PEERS)
 .PHONY: check-pages
 check-pages: linux ## Compile and run the blocks of README and docs, and check links; PAGES=--all: skip nothing
-	@scripts/need python3 git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev liblwip-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
+	@scripts/need python3 python3-venv git gcc clang libc6-dev cmake make pkg-config libmodbus-dev libmbedtls-dev liblwip-dev libmosquitto-dev libcjson-dev libyaml-dev openssl \
 		gcc-avr avr-libc arduino-core-avr \
 		$(if $(filter --all,$(PAGES)),gcc-arm-none-eabi libnewlib-arm-none-eabi gcc-aarch64-linux-gnu libc6-dev-arm64-cross) \
 		$(FIRMWARE_LIBC)
-	@$(MAKE) --no-print-directory $(PAGE_PROGRAMS)
+	@$(MAKE) --no-print-directory venv $(PAGE_PROGRAMS)
 	@scripts/build/pictures --check
 	@scripts/check/pages $(PAGES)
 
