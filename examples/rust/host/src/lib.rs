@@ -46,3 +46,8 @@ pub fn open_line(path: &str) -> io::Result<Line> {
         Sender::from_file_unchecked(file)?,
     )))
 }
+
+/// The programs of a page, which are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../../docs/porting-from-tokio-modbus.md")]
+pub struct Porting;
