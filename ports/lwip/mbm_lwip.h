@@ -8,8 +8,9 @@
  *
  * lwIP allows its raw API in one thread at a time. There are two ways to keep to that:
  *
- * - All calls are made where lwIP runs: in the main loop of NO_SYS, in tcpip_thread
- * (tcpip_callback, sys_timeout), or by a task that holds the lock of the core. This is the default.
+ * - All calls are made where lwIP runs: in the main loop of NO_SYS, in tcpip_thread, by
+ *   tcpip_callback or sys_timeout, or by a task that holds the lock of the core. This is the
+ *   default.
  * - Each call takes the lock of the core itself. Then clients and servers are polled by a task
  *   of yours, which must not hold the lock. Set `isTask` of each connection and listener.
  *
@@ -31,6 +32,9 @@ extern "C" {
 
 #if !LWIP_TCP
 #error "mbm's port for lwIP needs TCP: set LWIP_TCP to 1 in lwipopts.h."
+#endif
+#if !LWIP_CALLBACK_API
+#error "mbm's port for lwIP needs its callbacks: set LWIP_CALLBACK_API to 1 in lwipopts.h."
 #endif
 
 /** The TCP port of Modbus. */
@@ -57,22 +61,23 @@ typedef struct mbm_lwip {
      * least twice a second. It runs where lwIP runs. With `isTask` it may only wake the task.
      * Without, it may poll the client or server. */
     void (*ready)(void *context);
-    void *context;  /**< set by the program: passed to `ready` */
-    uint8_t isTask; /**< set by the program: 1 if a task makes the calls, which does not hold the
-                       lock of lwIP's core: each call takes it */
-    uint8_t isBusy; /**< set by the program: 1 while the peer waits for a response, so that the
-                         connection is not idle; needed only for requests that may take longer than
-                         the idle time of the listener */
-    err_t error; /**< why there is no link, an err_t of lwIP: ERR_INPROGRESS while the connection is
-                      being made; ERR_RST if the peer refused or reset it, ERR_CLSD if it closed it,
-                      ERR_ABRT if lwIP gave it up, ERR_TIMEOUT if this port did, or
-                    mbm_lwip_listen's listener for a new connection; ERR_RTE if no interface is up
-                    that leads to the peer; ERR_MEM; ERR_CONN after mbm_lwip_disconnect; ERR_OK
-                    while there is a link */
-    uint8_t state;           /**< private */
-    uint8_t flags;           /**< private */
-    u16_t port;              /**< private */
-    ip_addr_t address;       /**< private */
+    void *context;     /**< set by the program: passed to `ready` */
+    uint8_t isTask;    /**< set by the program: 1 if a task makes the calls, which does not hold the
+                          lock of lwIP's core: each call takes it */
+    uint8_t isBusy;    /**< set by the program: 1 while the peer waits for a response, so that the
+                            connection is not idle; needed only for requests that may take longer than
+                            the idle time of the listener */
+    err_t error;       /**< why there is no link, an err_t of lwIP; mbm_lwip_text says it in words.
+                            ERR_INPROGRESS while the connection is being made; ERR_RST if the peer
+                            refused or reset it, ERR_CLSD if it closed it; ERR_TIMEOUT if nothing has
+                            answered, or if the listener took the place of an idle connection;
+                            ERR_ABRT if the peer acknowledges nothing, or the interface has another
+                            address; ERR_RTE if no interface that is up leads to the peer; ERR_MEM;
+                            ERR_CONN after mbm_lwip_disconnect; ERR_OK while there is a link */
+    uint8_t state;     /**< private */
+    uint8_t flags;     /**< private */
+    u16_t port;        /**< private */
+    ip_addr_t address; /**< private */
     struct tcp_pcb *pcb;     /**< private */
     struct tcp_pcb *calling; /**< private */
     struct pbuf *received;   /**< private */
@@ -107,8 +112,8 @@ typedef struct mbm_lwip_listener {
  * @param address  the server's address; copied
  * @param port     the server's TCP port, usually MBM_LWIP_PORT
  * @return MBM_PENDING while the connection is being made; MBM_LINK_LOST, with the reason in
- *         `error`; MBM_BUSY if `link` is in use; MBM_INVALID_ARGUMENT also for no address and port
- * 0
+ *         `error`; MBM_BUSY if `link` is in use; MBM_INVALID_ARGUMENT also for port 0 and the
+ *         address 0.0.0.0
  */
 uint8_t mbm_lwip_open(mbm_lwip *link, const ip_addr_t *address, uint16_t port);
 
