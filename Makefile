@@ -148,6 +148,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@scripts/check/functions
 	@CARGO="$(CARGO)" scripts/check/names
 	@scripts/check/packages
+	@scripts/check/kits
 	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell

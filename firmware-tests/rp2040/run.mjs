@@ -1,9 +1,11 @@
 // Runs a program for the RP2040 in the emulator rp2040js:
 //
-//   node run.mjs IMAGE.elf usb|stock-usb|uart [ROM.elf]
+//   node run.mjs IMAGE.elf usb|stock-usb|uart|loop [ROM.elf]
 //
 // Standard input and output are the program's line: its USB, or its UART 1. Standard error says "ready" once
-// the line is open. `stock-usb` is the emulator's own USB host. Signals: SIGUSR1 pulls the cable, SIGUSR2 plugs it in.
+// the line is open, and at the end of standard input how much stack the program took, and how many
+// cycles each interrupt. `stock-usb` is the emulator's own USB host. With `loop` UART 1's TX is wired to its RX, and standard output
+// is UART 0. Signals: SIGUSR1 pulls the cable, SIGUSR2 plugs it in.
 import { readFileSync, writeSync } from 'node:fs';
 import { ConsoleLogger, LogLevel, Simulator, USBCDC } from 'rp2040js';
 import { UsbHost } from './usb_host.mjs';
@@ -11,6 +13,7 @@ import { UsbHost } from './usb_host.mjs';
 const [image, line, rom] = process.argv.slice(2);
 const FLASH = 0x10000000;
 const CYCLE = 1e9 / 125e6; // in nanoseconds
+const STACK = 0x20042000; // the end of it, in pico-sdk's layout
 // The most cycles between two looks at the line.
 const ROUND = 50000;
 
@@ -59,7 +62,8 @@ if (line === 'usb') {
         uart.feedByte(queue.shift());
         if (queue.length) character.schedule(11e9 / uart.baudRate);
     });
-    uart.onByte = (byte) => out([byte]);
+    uart.onByte = line === 'loop' ? (byte) => send([byte]) : (byte) => out([byte]);
+    if (line === 'loop') chip.uart[0].onByte = (byte) => out([byte]);
     send = (bytes) => {
         if (!queue.length) character.schedule(11e9 / uart.baudRate);
         queue.push(...bytes);
@@ -67,12 +71,36 @@ if (line === 'usb') {
     setImmediate(() => say('ready'));
 }
 process.stdin.on('data', (bytes) => send(bytes));
-process.stdin.on('end', () => process.exit(0));
+process.stdin.on('end', () => {
+    say(`stack ${STACK - lowest}`);
+    for (const [number, { cycles, calls }] of handlers) say(`interrupt ${number - 16} ${cycles} cycles ${calls} calls`);
+    process.exit(0);
+});
+
+/** What the program took, for scripts/bench/kits: the lowest place of its stack, and the cycles in each interrupt's handler. */
+let lowest = STACK;
+const handlers = new Map();
+function note(core, before, cycles) {
+    lowest = Math.min(lowest, core.SP);
+    const number = core.IPSR || before;
+    if (!number) return;
+    if (!handlers.has(number)) handlers.set(number, { cycles: 0, calls: 0 });
+    const of = handlers.get(number);
+    of.cycles += cycles;
+    if (!before) of.calls++;
+}
 
 function round() {
     const { core, clock } = { core: chip.core, clock: simulator.clock };
     for (let cycles = 0; cycles < ROUND;) {
-        const spent = core.waiting ? Math.max(1, clock.nanosToNextAlarm / CYCLE) : core.executeInstruction();
+        let spent;
+        if (core.waiting) {
+            spent = Math.max(1, clock.nanosToNextAlarm / CYCLE);
+        } else {
+            const before = core.IPSR;
+            spent = core.executeInstruction();
+            note(core, before, spent);
+        }
         clock.tick(spent * CYCLE);
         cycles += spent;
     }

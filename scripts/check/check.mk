@@ -69,6 +69,13 @@ check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree
 	@$(MAKE) --no-print-directory BOARDS= assembler $(BUILD)/plain/mbm
 	@scripts/check/real $(KIT) $(FOLDER) $(BOARDS)
 
+# The folders of `make check-real` for these kits, and a clone of nanoMODBUS.
+.PHONY: bench-kits
+bench-kits: $(ARCHIVE) ## Measure the examples for FREERTOS, STM32 and PICO, the folders of the kits, beside NANOMODBUS, its clone; writes docs/reports/kits.md
+	@scripts/need python3 cmake ninja-build gcc libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
+	@scripts/bench/kits $(FREERTOS) $(STM32) $(PICO) $(NANOMODBUS)
+
 .PHONY: misra
 misra: ## Run cppcheck, for C with its addon for MISRA C; docs/maintainers/misra.md lists the accepted findings
 	@scripts/need cppcheck
