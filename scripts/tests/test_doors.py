@@ -2,6 +2,7 @@
 
 import io
 import unittest
+import unittest.mock
 
 from loading import ROOT, load
 
@@ -37,6 +38,27 @@ class Doors(unittest.TestCase):
     def test_a_door_that_the_readme_has_not_is_named(self):
         with self.assertRaisesRegex(SystemExit, "the README has no door The cellar"):
             doors.commands("The cellar")
+
+    def test_a_door_fails_with_the_command_that_fails(self):
+        class Played:
+            transcript = io.StringIO()
+
+            def __init__(self, name, files):
+                self.transcript.name = f"{name}.txt"
+
+            def prepare(self, more):
+                pass
+
+            def run(self, user, lines):
+                return [doors.Step(line, 1.0, 1.0, int(line.startswith("cargo add")), 0.0) for line in lines]
+
+            def sizes(self, pattern):
+                return 7
+
+        door = next(door for door in doors.DOORS if door.name == "Rust")
+        with unittest.mock.patch.object(doors, "Machine", Played):
+            with self.assertRaisesRegex(SystemExit, "doors: Rust: .*cargo add embedded-io@0.7.*see Rust.txt"):
+                doors.opened(door)
 
     def test_a_transcript_has_the_times_of_each_command_and_of_its_packages(self):
         machine = object.__new__(doors.Machine)
