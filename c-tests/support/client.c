@@ -63,8 +63,10 @@ void asker_begin_tcp_by(asker *a, uint16_t port, held_clock *clock)
 {
     begin_tcp(a, port);
     a->clock = clock;
-    if (clock)
+    if (clock) {
         a->port = held_clock_port(clock, &a->port);
+        held_clock_sleep(clock, 0);
+    }
     OK(mbm_client_beginTcp(&a->client, &a->port, a->incoming, sizeof a->incoming, a->outgoing,
                            sizeof a->outgoing));
     OK(mbm_client_setResponseTimeout(&a->client, PATIENCE_MS));
@@ -92,6 +94,8 @@ void asker_rest(asker *a)
     struct timespec time = {(time_t)(delay / 1000000u), (long)(delay % 1000000u) * 1000};
     struct pollfd line = {a->service[0] ? a->tcp.fd : a->tty.fd, POLLIN, 0};
 
+    if (a->clock)
+        held_clock_sleep(a->clock, delay);
     if (a->service[0] && mbm_tcp_isConnected(&a->tcp) == 0)
         line.events |= POLLOUT;
     ppoll(&line, 1, &time, NULL);

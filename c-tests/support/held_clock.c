@@ -14,15 +14,24 @@ static int64_t machine(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+/* Microseconds after which a master that does not sleep looks again. */
+enum { LOOK = 5000 };
+
 static int64_t read_clock(held_clock *c)
 {
-    int64_t now = machine();
+    const int64_t now = machine(), most = c->due < c->seen ? c->due : c->seen;
 
     if (c->bytes > 0)
         return c->stopped;
-    if (now - c->lag > c->due)
-        c->lag = now - c->due;
+    if (now - c->lag > most)
+        c->lag = now - most;
     return now - c->lag;
+}
+
+static void see(held_clock *c, int64_t until)
+{
+    if (c->seen != HELD_CLOCK_NEVER && until > c->seen)
+        c->seen = until;
 }
 
 /* Goes on from the time that it shows. The device still has `bytes` bytes to process. */
@@ -33,6 +42,7 @@ static void set(held_clock *c, uint32_t bytes)
     c->stopped = shown;
     c->bytes = bytes;
     c->lag = machine() - shown;
+    see(c, shown);
 }
 
 void held_clock_start(held_clock *c)
@@ -40,6 +50,7 @@ void held_clock_start(held_clock *c)
     memset(c, 0, sizeof *c);
     c->due = HELD_CLOCK_NEVER;
     c->readTime = machine();
+    c->seen = HELD_CLOCK_NEVER;
     if (pthread_mutex_init(&c->lock, NULL)) {
         perror("held_clock");
         abort();
@@ -97,6 +108,15 @@ void held_clock_due(held_clock *c, int64_t at)
     pthread_mutex_unlock(&c->lock);
 }
 
+void held_clock_sleep(held_clock *c, int64_t microseconds)
+{
+    pthread_mutex_lock(&c->lock);
+    if (c->seen == HELD_CLOCK_NEVER)
+        c->seen = c->readTime;
+    see(c, c->readTime + microseconds);
+    pthread_mutex_unlock(&c->lock);
+}
+
 /* --- the port */
 
 static int16_t clock_read(void *context, uint8_t *bytes, uint16_t capacity)
@@ -129,6 +149,7 @@ static uint32_t clock_micros(void *context)
 
     pthread_mutex_lock(&c->lock);
     c->readTime = read_clock(c);
+    see(c, c->readTime + LOOK);
     uint32_t shown = (uint32_t)c->readTime;
     pthread_mutex_unlock(&c->lock);
     return shown;

@@ -1,7 +1,8 @@
 /* A master's clock for tests with a device in another thread. It stands still from the time
  * at which a byte is written until the device has processed it. It does not go beyond the
  * time at which the device has something to do. So the device is never late because its
- * thread did not run, and tests can use short timeouts. */
+ * thread did not run, and tests can use short timeouts. Nor is a master late that says when it
+ * sleeps: the clock waits for it to look. */
 #ifndef HELD_CLOCK_H
 #define HELD_CLOCK_H
 
@@ -19,6 +20,7 @@ typedef struct held_clock {
     int64_t stopped;  /* the time that it shows while it stands still */
     int64_t readTime; /* the time that the master read last */
     int64_t due;      /* the time that it does not go beyond */
+    int64_t seen;     /* nor beyond this one, until a master looks again that says when it sleeps */
     uint32_t bytes;   /* bytes that were written and that the device has not processed */
     unsigned link;    /* how many connections were forgotten */
     mbm_port port;    /* the line's port */
@@ -31,6 +33,10 @@ int64_t held_clock_now(held_clock *c);
 
 /* For the master: the line's port, with this clock. */
 mbm_port held_clock_port(held_clock *c, const mbm_port *line);
+
+/* For a master that says when it sleeps, before it does, and at its begin: so long it does not
+ * look. From then on the clock waits for it. */
+void held_clock_sleep(held_clock *c, int64_t microseconds);
 
 /* For the device: it has processed `bytes` bytes of a link. `link` is the value that
  * held_clock_link returned when the link was made. A serial line is link 0. */
