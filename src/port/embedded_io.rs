@@ -1,6 +1,6 @@
 //! A port over the traits of the crate embedded-io, for UARTs and sockets of a HAL.
 
-use super::transmission::Transmission;
+use super::transmission::{Transmission, MOST_BITS};
 use super::Port;
 use crate::error::Error;
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
@@ -82,13 +82,41 @@ impl<D, C> EmbeddedIo<D, C> {
     /// As this port, with an RS-485 driver: `driver` switches it on with `true` before the
     /// first byte is sent, and off after the last one. The port computes from the baud rate
     /// when that byte has left; the driver stays on for one character more.
+    ///
+    /// A character has 11 bits here, as with a parity or a second stop bit. For one of 10 bits
+    /// there is [`with_driver_and_bits`](Self::with_driver_and_bits).
     pub fn with_driver<E: FnMut(bool)>(self, driver: E, baud: u32) -> EmbeddedIo<D, C, E> {
+        self.with_driver_and_bits(driver, baud, MOST_BITS)
+    }
+
+    /// As [`with_driver`](Self::with_driver), on a line whose characters have this number of bits, the start
+    /// and stop bits included: 10 without a parity and with one stop bit. Then the driver is not on for 25
+    /// characters too long after a frame of 256 bytes. A number that is too small cuts off the end.
+    ///
+    /// ```
+    /// use embedded_io::{Read, ReadReady, Write, WriteReady};
+    /// use mbm::port::{EmbeddedIo, Port};
+    ///
+    /// fn of_8n1<U: Read + ReadReady + Write + WriteReady>(
+    ///     uart: U,
+    ///     micros: fn() -> u32,
+    ///     switch_driver: fn(bool),
+    /// ) -> impl Port {
+    ///     EmbeddedIo::serial(uart, micros).with_driver_and_bits(switch_driver, 19200, 10)
+    /// }
+    /// ```
+    pub fn with_driver_and_bits<E: FnMut(bool)>(
+        self,
+        driver: E,
+        baud: u32,
+        bits: u8,
+    ) -> EmbeddedIo<D, C, E> {
         EmbeddedIo {
             device: self.device,
             clock: self.clock,
             driver,
             is_serial: self.is_serial,
-            transmission: Transmission::new(baud),
+            transmission: Transmission::new(baud, bits),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A port over the traits of embedded-io-async, whose futures it polls once.
 
-use super::transmission::Transmission;
+use super::transmission::{Transmission, MOST_BITS};
 use super::Port;
 use crate::error::Error;
 use core::future::Future;
@@ -109,13 +109,41 @@ impl<D, C> PolledIo<D, C> {
     ///     client.holding_registers(17, 107)
     /// }
     /// ```
+    ///
+    /// A character has 11 bits here, as with a parity or a second stop bit. For one of 10 bits
+    /// there is [`with_driver_and_bits`](Self::with_driver_and_bits).
     pub fn with_driver<E: FnMut(bool)>(self, driver: E, baud: u32) -> PolledIo<D, C, E> {
+        self.with_driver_and_bits(driver, baud, MOST_BITS)
+    }
+
+    /// As [`with_driver`](Self::with_driver), on a line whose characters have this number of bits, the start
+    /// and stop bits included: 10 without a parity and with one stop bit. Then the driver is not on for 25
+    /// characters too long after a frame of 256 bytes. A number that is too small may cut off the end.
+    ///
+    /// ```
+    /// use embedded_io_async::{Read, Write};
+    /// use mbm::port::{PolledIo, Port};
+    ///
+    /// fn of_8n1<U: Read + Write>(
+    ///     uart: U,
+    ///     micros: fn() -> u32,
+    ///     switch_driver: fn(bool),
+    /// ) -> impl Port {
+    ///     PolledIo::serial(uart, micros).with_driver_and_bits(switch_driver, 19200, 10)
+    /// }
+    /// ```
+    pub fn with_driver_and_bits<E: FnMut(bool)>(
+        self,
+        driver: E,
+        baud: u32,
+        bits: u8,
+    ) -> PolledIo<D, C, E> {
         PolledIo {
             device: self.device,
             clock: self.clock,
             driver,
             is_serial: self.is_serial,
-            transmission: Transmission::new(baud),
+            transmission: Transmission::new(baud, bits),
             is_unflushed: self.is_unflushed,
             is_lost: self.is_lost,
             waker: self.waker,
