@@ -4,7 +4,11 @@
 
 // The pins RO, DI and driverPin of a board of each core.
 #if defined(ARDUINO_ARCH_STM32) // Blue Pill, Nucleo F103RB
-HardwareSerial bus(PA10, PA9); // RO, DI
+#if STM32_CORE_VERSION_MAJOR >= 3
+Uart bus(PA10, PA9); // RO, DI
+#else
+HardwareSerial bus(PA10, PA9); // the same, up to version 2 of STM32duino
+#endif
 const uint8_t driverPin = PA8;
 #elif defined(ESP32) // ESP32 DevKit: RO at GPIO16, DI at GPIO17
 #define bus Serial1
