@@ -246,6 +246,15 @@ void chip_receive(uint8_t byte, unsigned errors)
         rxStream.CR = 0;
         return;
     }
+    if (isDma && m.rxDmaFails) {
+        /* The HAL ends both directions. */
+        rxStream.CR = 0;
+        huart1.RxState = HAL_UART_STATE_READY;
+        (void)HAL_UART_AbortTransmit(&huart1);
+        huart1.ErrorCode |= HAL_UART_ERROR_DMA;
+        failed = 1;
+        return;
+    }
     /* The character that was lost is the one before. */
     into[place++] = byte;
     if (isDma)

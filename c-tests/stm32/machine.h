@@ -15,7 +15,8 @@ typedef struct machine {
 
     /* faults of the chip */
     uint8_t hasNoPin, txDmaStops, rxDmaStops;
-    uint8_t isLooped; /* a wire leads from TX to RX */
+    uint8_t rxDmaFails; /* with a transfer error, at the next character */
+    uint8_t isLooped;   /* a wire leads from TX to RX */
 
     /* the wire: what was sent, and when its last bit had left */
     uint8_t sent[MACHINE_SENT];

@@ -307,6 +307,10 @@ static uint8_t line_flush(void *context)
 
     if (line->uart == NULL)
         return 1;
+    /* While it sends, nothing reads, and the HAL's handler of an idle line would clear an overrun.
+     */
+    if (receives_by_dma(line->uart))
+        count_flags(line);
     end_if_overdue(line);
     if (line->isDeaf && !line->isSending)
         driver_off(line);

@@ -151,7 +151,7 @@ def serve_in_qemu(kit, image: pathlib.Path) -> None:
 def on_this_machine(kit, board: str) -> None:
     """Runs the tests c-tests/test_stm32*.c over the source of a family's HAL, whose registers are played."""
     _, name, *threshold = board.split("-")
-    root, tests, played = kit.root, ("test_stm32", "test_stm32_server"), PLAYED[name]
+    root, tests, played = kit.root, ("test_stm32", "test_stm32_server", "test_stm32_field"), PLAYED[name]
     hal, work, host = kit.there(kit.tree / f"stm32{name}xx_hal_driver"), kit.work / board, root / "firmware-tests/kits/stm32/host"
     work.mkdir()
     template = kit.there(hal / f"Inc/stm32{name}xx_hal_conf_template.h")

@@ -10,7 +10,7 @@ static DMAMUX_Channel_TypeDef *rxMux, *txMux;
 enum { RX = 4, TX = 3 };
 #define IS_LED(channel, request) 1
 #endif
-enum { ALL = 1, COMPLETE = 2, HALF = 4 };
+enum { ALL = 1, COMPLETE = 2, HALF = 4, FAILED = 8 };
 
 static DMA_TypeDef *dma;
 static DMA_Channel_TypeDef *rx, *tx;
@@ -50,8 +50,16 @@ static void count(DMA_Channel_TypeDef *channel, unsigned number, uint32_t reload
     dma->ISR |= flags << (4 * number);
 }
 
+static void fail_reception(void)
+{
+    rxEnabled = rx->CCR &= ~DMA_CCR_EN;
+    dma->ISR |= (uint32_t)(FAILED | ALL) << (4 * RX);
+}
+
 static void serve_reception(void)
 {
+    if ((rx->CCR & DMA_CCR_EN) && m.rxDmaFails && usart_has_byte())
+        fail_reception();
     if (!IS_LED(rxMux, DMA_REQUEST_USART1_RX))
         return;
     while ((rx->CCR & DMA_CCR_EN) && rx->CNDTR != 0 && usart_has_byte()) {
@@ -125,7 +133,8 @@ static int waits(const DMA_Channel_TypeDef *channel, unsigned number)
     uint32_t flags = dma->ISR >> (4 * number);
 
     return ((flags & COMPLETE) && (channel->CCR & DMA_CCR_TCIE)) ||
-           ((flags & HALF) && (channel->CCR & DMA_CCR_HTIE));
+           ((flags & HALF) && (channel->CCR & DMA_CCR_HTIE)) ||
+           ((flags & FAILED) && (channel->CCR & DMA_CCR_TEIE));
 }
 
 unsigned dma_waits(void)

@@ -42,8 +42,16 @@ static uint32_t counted(DMA_Stream_TypeDef *stream, uint32_t reload, uint32_t ha
     return stream->NDTR == 0 ? all : 0;
 }
 
+static void fail_reception(void)
+{
+    rxEnabled = rx->CR &= ~DMA_SxCR_EN;
+    dma->LISR |= DMA_LISR_TEIF2;
+}
+
 static void serve_reception(void)
 {
+    if ((rx->CR & DMA_SxCR_EN) && m.rxDmaFails && usart_has_byte())
+        fail_reception();
     if (!(rx->CR & DMA_SxCR_EN) || !IS_LED(rxMux, DMA_REQUEST_USART1_RX))
         return;
     while ((rx->CR & DMA_SxCR_EN) && usart_has_byte()) {
@@ -116,7 +124,8 @@ void dma_after(void)
 static int waits(const DMA_Stream_TypeDef *stream, uint32_t flags)
 {
     return ((flags & 0x20) && (stream->CR & DMA_SxCR_TCIE)) ||
-           ((flags & 0x10) && (stream->CR & DMA_SxCR_HTIE));
+           ((flags & 0x10) && (stream->CR & DMA_SxCR_HTIE)) ||
+           ((flags & 0x08) && (stream->CR & DMA_SxCR_TEIE));
 }
 
 unsigned dma_waits(void)
