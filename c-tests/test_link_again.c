@@ -627,3 +627,33 @@ TEST(a_request_that_was_answered_before_it_was_sent_is_not_sent)
     run(10);
     works_over_the_new_link(MBM_FRAMING_TCP);
 }
+
+/* A program that does not ask for the link's events, and polls less often than attempts are due. */
+static void nobody_hears_of_attempts_without_wait(void)
+{
+    OK(mbm_link_setCallback(&kept, NULL, NULL));
+    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_NONE, 0, 0));
+}
+
+FRAMING_TEST(requests_end_if_attempts_that_fail_follow_each_other_without_a_wait)
+{
+    static const uint8_t failing[] = {MBM_LINK_LOST, MBM_PENDING};
+
+    for (unsigned i = 0; i < 4; i++) {
+        if (i % 2 == 0)
+            begin(framing);
+        else
+            begin_up(framing);
+        nobody_hears_of_attempts_without_wait();
+        connects_with = failing[i / 2];
+        m.is_lost = 1;
+        for (unsigned round = 0; round < 10; round++) {
+            queue_read(&request);
+            for (unsigned polls = 0; request.status == MBM_PENDING && polls < 3; polls++) {
+                (void)mbm_client_poll(&client);
+                m.now += MS;
+            }
+            IS(MBM_LINK_LOST, request.status);
+        }
+    }
+}

@@ -304,15 +304,15 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
     ((*(*link).kind.transport).release)(object, request);
 }
 
-/// Counts an event. Returns the request whose `done` reports the event, if the program wants
-/// to know it.
+/// Counts an event. Returns the request whose `done` reports the event, also if the program does
+/// not want to know it: the poll goes on after it and ends requests, which the event of an attempt
+/// in every poll would hold back otherwise.
 unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
     count(link, |counters| match event {
         LinkEvent::Connected => &mut counters.connected,
         LinkEvent::Lost => &mut counters.lost,
         LinkEvent::Failed => &mut counters.failed,
     });
-    (*link).callback?;
     (*link).event = event as u8;
     (*link).status = status.code();
     RequestPtr::new(&raw mut (*link).request)
