@@ -1,9 +1,14 @@
-"""What MkDocs does beside its own: the pages of the API in the navigation, the anchors of a forge, words of code
-that stay whole, and no file with the time of the build."""
+"""What MkDocs does beside its own: the pages of the API in the navigation, the anchors of a forge, lines of code
+that end where they may, wide enough columns of text, and no file with the time of the build."""
 
 import json
 import pathlib
 import re
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+
+from breaks import broken_well  # noqa: E402
 
 
 def slug(text, separator):
@@ -31,19 +36,13 @@ def on_config(config):
     return config
 
 
-# The most letters of a word that fits a line of a phone.
-WORD = 44
+# A cell with more letters holds sentences, and is not squeezed between columns of code.
+SENTENCE = 40
 
 
-def whole(block):
-    """A block of code whose words with a hyphen stay in one line: a browser would break `--option` after a hyphen."""
-    def word(found):
-        return f'<span class="whole">{found[0]}</span>' if len(found[0]) <= WORD else found[0]
-
-    parts = re.split(r"(<[^>]*>)", block[0])
-    parts[::2] = [re.sub(r"[^\s<>]*-[^\s<>]*", word, part) for part in parts[::2]]
-    return "".join(parts)
+def cell(found):
+    return '<td class="text">' + found[1] if len(re.sub(r"<[^>]*>", "", found[1])) > SENTENCE else found[0]
 
 
 def on_page_content(html, **_):
-    return re.sub(r"<pre\b.*?</pre>", whole, html, flags=re.S)
+    return broken_well(re.sub(r"<td>((?:(?!</td>).)*)", cell, html, flags=re.S))

@@ -4,6 +4,7 @@ on rustdoc's own pages that leads back to the site."""
 import html
 import re
 
+from breaks import RUST, broken_well
 from entries import table
 
 IMPLEMENTORS = re.compile(r'src="([./]+)(trait\.impl/[\w./]+\.js)"')
@@ -48,7 +49,8 @@ def page(folder):
 
 
 def lead_back(folder):
-    """Puts the path to the site's first page into the bar of each of rustdoc's pages, and adds the lists of a
+    """Puts the path to the site's first page into the bar of each of rustdoc's pages, ends its lines of code where they may
+    end, and adds the lists of a
     trait's implementors that rustdoc names and does not write, as empty ones. Returns how many pages have the bar."""
     count = 0
     for file in folder.rglob("*.html"):
@@ -59,6 +61,8 @@ def lead_back(folder):
             listed.touch()
         if BAR in text:
             root = "../" * (len(file.relative_to(folder).parts))
-            file.write_text(text.replace(BAR, "").replace("SITE/", root), encoding="utf-8")
+            text = text.replace(BAR, "").replace("SITE/", root)
+            # Sources scroll beside the numbers of their lines.
+            file.write_text(text if '<body class="rustdoc src">' in text else broken_well(text, RUST), encoding="utf-8")
             count += 1
     return count
