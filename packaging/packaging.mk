@@ -84,6 +84,7 @@ check-single: single-parts ## Drop those two files into an empty project: a mast
 	@scripts/check/single
 two-files: single-parts ## Compare them with the two files of nanoMODBUS, NANOMODBUS=clone of nanoMODBUS; writes docs/reports/two-files.md
 	@scripts/check/single --write "$(NANOMODBUS)"
+	@scripts/build/pictures
 
 # DOOR is a word of a door's heading. Without it the page is written.
 DOOR ?=

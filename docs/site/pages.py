@@ -32,8 +32,6 @@ class Site:
             self.files = {str(p.relative_to(root)) for p in files}
         else:
             self.files = {name for name in listed.stdout.splitlines() if (root / name).exists()}
-        # Those that scripts/build/pictures has drawn are not in git.
-        self.files |= {str(path.relative_to(root)) for path in (root / "docs/pictures").glob("*.svg")}
         self.headers = dict(HEADERS)
         self.sources = set()
 

@@ -4,6 +4,9 @@ A picture is 400 units wide, so that a telephone shows it without making its tex
 card has its own background, so a picture can be read on any page, and its colours follow the
 reader's choice of light or dark. Text stays text, in the system's font; a drawing fails if a text
 does not fit, even in DejaVu Sans, which is wider than other systems' fonts.
+
+A picture may appear step by step, again and again. Whoever asks the system for less motion sees the
+whole picture at once, and so does a viewer that does not know animations.
 """
 
 from xml.sax.saxutils import escape, quoteattr
@@ -91,8 +94,23 @@ ARROWHEAD = ('<marker id="arrow" viewBox="0 0 8 8" refX="7" refY="4" markerWidth
              '<path class="head-of-arrow" d="M0 0L8 4L0 8z"/></marker>')
 
 
+PALE = 0.13  # how much of a part is seen before its step
+FADE = 0.3  # seconds
+
+
 def number(value):
     return f"{value:.1f}".removesuffix(".0")
+
+
+def appearing(steps):
+    """The rules of a style sheet by which the parts of each step appear after the seconds of those before it."""
+    whole, before, rules = sum(steps), 0, []
+    for step, seconds in enumerate(steps[:-1], 1):
+        before += seconds
+        begin, end = (f"{100 * time / whole:.1f}%" for time in (before, before + FADE))
+        rules.append(f".step-{step}{{animation:step-{step} {number(whole)}s infinite}}"
+                     f"@keyframes step-{step}{{0%,{begin}{{opacity:{PALE}}}{end},98%{{opacity:1}}to{{opacity:{PALE}}}}}")
+    return "@media (prefers-reduced-motion:no-preference){" + "".join(rules) + "}" if rules else ""
 
 
 class Drawing:
@@ -101,11 +119,19 @@ class Drawing:
     def __init__(self, title, description):
         self.title, self.description = title, description
         self.parts, self.bottom = [], 0
+        # How long each step lasts, in seconds. The first one shows all that belongs to no step.
+        self.steps, self.step = [1], 0
+
+    def appear(self, seconds):
+        """Begins a step: what is drawn from now on appears after the steps before, and nothing else does for `seconds`."""
+        self.steps.append(seconds)
+        self.step = len(self.steps) - 1
 
     def add(self, tag, bottom, content=None, **attributes):
         """Adds an element that ends at the height `bottom`. Attributes: `kind` is the class."""
         self.bottom = max(self.bottom, bottom)
-        attributes = {"class": attributes.pop("kind"), **attributes}
+        step = f"step-{self.step}" if self.step else ""
+        attributes = {"class": f"{attributes.pop('kind')} {step}".strip(), **attributes}
         written = "".join(f" {name}={quoteattr(value if isinstance(value, str) else number(value))}"
                           for name, value in attributes.items() if value != "")
         self.parts.append(f"<{tag}{written}/>" if content is None else f"<{tag}{written}>{escape(content)}</{tag}>")
@@ -157,7 +183,7 @@ class Drawing:
             'aria-labelledby="title desc">',
             f'<title id="title">{escape(self.title)}</title>',
             f'<desc id="desc">{escape(self.description)}</desc>',
-            f"<style>{escape(STYLE)}</style>",
+            f"<style>{escape(STYLE + appearing(self.steps))}</style>",
             f"<defs>{ARROWHEAD}</defs>",
             f'<rect class="card" x="1" y="1" width="{WIDTH - 2}" height="{number(height - 2)}" rx="8"/>',
             *self.parts,

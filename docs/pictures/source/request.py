@@ -68,11 +68,11 @@ def draw():
     drawing.line((LEFT, y + 34), (18, y + 34), (18, tops["gap"][1]), (LEFT, tops["gap"][1]), arrow="end")
     drawing.line((18, tops["gap"][1]), (18, tops["queued"][1]), (LEFT, tops["queued"][1]), arrow="end")
     drawing.text(LEFT - 8, y + 50, "yes", "soft", "end")
-    drawing.line((LEFT + BOX, y + 23), (RIGHT, y + 23), arrow="end")
-    drawing.text((LEFT + BOX + RIGHT) / 2, y + 18, "no", "soft", "middle")
-    drawing.box(RIGHT, y - 27, END, 104, "bad", ["RESPONSE_", "TIMED_OUT,", "INVALID_CRC,", "MALFORMED_", "REPLY, …"],
+    drawing.line((AXIS, y + 47), (AXIS, y + 75), arrow="end")
+    drawing.text(AXIS + 8, y + 65, "no", "soft")
+    drawing.box(LEFT, y + 75, WIDTH - MARGIN - LEFT, 47, "bad", ["RESPONSE_TIMED_OUT, INVALID_CRC,", "MALFORMED_REPLY, …"],
                 ("soft", "soft"))
-    y = drawing.paragraph(MARGIN, y + 98, WIDTH - 2 * MARGIN,
+    y = drawing.paragraph(MARGIN, y + 146, WIDTH - 2 * MARGIN,
                           "A repetition of a master begins with the gap, one of a client in the queue, with its "
                           "back-off. A client also repeats after LINE_BUSY, and after the exception of a busy device. "
                           "CANCELLED ends each state; the driver is off then.", "soft")

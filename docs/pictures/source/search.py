@@ -1,4 +1,4 @@
-"""How the reply is found in noise: for docs/reliability.md."""
+"""How the reply is found in noise, byte by byte: for docs/reliability.md and docs/architecture.md."""
 
 from drawing import MARGIN, WIDTH, Drawing
 
@@ -37,11 +37,12 @@ def draw():
     drawing.text(WIDTH / 2, y, f"unit {UNIT} was asked for {len(WORDS)} holding registers:", "", "middle")
     drawing.text(WIDTH / 2, y + 18, f"the reply begins {REPLY[:3].hex(' ').upper()}, and has {len(REPLY)} bytes", "",
                  "middle")
-    y += 34
-    for index, byte in enumerate(RECEIVED):
-        kind = "good" if index >= len(NOISE) else "plain"
-        drawing.box(MARGIN + index * CELL + 1, y, CELL - 2, 30, kind, [f"{byte:02X}"], ("code", ""))
-    y += 30
+    top = y + 34
+    y = top + 30
+
+    def arrive(last, kind="plain"):
+        """The byte of this number."""
+        drawing.box(MARGIN + (last - 1) * CELL + 1, top, CELL - 2, 30, kind, [f"{RECEIVED[last - 1]:02X}"], ("code", ""))
 
     def suffix(y, last, kind, texts):
         """A bracket below as many bytes as the reply has, up to number `last`, and what is found."""
@@ -53,12 +54,25 @@ def draw():
             y = drawing.paragraph(left, y + 31 if index == 0 else y, width, text, "strong" if index == 0 else "soft")
         return y - 10
 
+    for last in range(1, 11):
+        drawing.appear(0.4)
+        arrive(last)
+    drawing.appear(3)
+    arrive(11)
     y = suffix(y, 11, "bad", ["byte 11: no", f"the last {len(REPLY)} bytes begin with {RECEIVED[0]:02X}, which is not the unit"])
+    drawing.appear(4)
+    arrive(12)
     y = suffix(y, 12, "bad",
                ["byte 12: no", f"they begin like the reply; but the CRC of the first 9 is {false_crc.hex(' ').upper()}, and "
                 f"{claimed.hex(' ').upper()} stands there"])
+    drawing.appear(3)
+    arrive(13)
+    arrive(14)
     y = suffix(y, 13, "bad", ["bytes 13 and 14: no",
                               f"they begin with {RECEIVED[2]:02X} and with {RECEIVED[3]:02X}, which are not the unit"])
+    drawing.appear(10)
+    for last in range(len(NOISE) + 1, len(RECEIVED) + 1):
+        arrive(last, "good")
     y = suffix(y, 15, "good",
                ["byte 15: yes", f"the CRC {REPLY[-2:].hex(' ').upper()} is right", f"registers: {', '.join(map(str, WORDS))}"])
     drawing.bottom = y
