@@ -87,9 +87,8 @@ typedef int mbm_core_has_code;
         self.write("LICENSE", licence())
 
     def fill(self, source: str, name: str = "", **values: str) -> None:
-        """Takes a template. Replaces @VERSION@, @DESCRIPTION@, @REPOSITORY@ and the given values."""
-        known = {"VERSION": version(), "DESCRIPTION": fact("description"), "REPOSITORY": fact("repository"),
-                 **values}
+        """Takes a template. Replaces @VERSION@, @DESCRIPTION@ and the given values."""
+        known = {"VERSION": version(), "DESCRIPTION": fact("description"), **values}
         text = (ROOT / source).read_text(encoding="utf-8")
         text = re.sub(r"@([A-Z_]+)@", lambda m: known[m[1]] if m[1] in known else
                       self.fail(f"{source}: nothing is known for {m[0]}"), text)

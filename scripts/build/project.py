@@ -4,7 +4,8 @@ and the entries of packaging/project.toml. boards.py knows the boards.
 
   project.py           writes the project's address into the links to its releases and into Cargo.toml, and how a
                        reader gets mbm into the pages that a user begins with
-  project.py --check   fails if something else stands there
+  project.py --check   fails if something else stands there, or if any file of the project has an address of the
+                       project that it does not have: while nothing is published, any
 """
 
 import pathlib
@@ -26,6 +27,11 @@ def fact(key: str) -> str | bool:
     return tomllib.loads((ROOT / "packaging/project.toml").read_text(encoding="utf-8"))[key]
 
 
+def address() -> str:
+    """The address of the project for packages and pages; empty while it has none."""
+    return str(fact("repository")) if fact("published") else ""
+
+
 def licence() -> str:
     """Both licences in one text."""
     mit, apache = ((ROOT / f"LICENSE-{name}").read_text(encoding="utf-8") for name in ("MIT", "APACHE"))
@@ -35,8 +41,15 @@ def licence() -> str:
 
 # --- the address of the project and whether it has releases, both set in packaging/project.toml
 
-ADDRESS = [(re.compile(r"https?://[^\s()]+(?=/releases/latest\b)"), ["README.md", "docs/*.md"]),
-           (re.compile(r'(?<=^repository = ")[^"]+', re.M), ["Cargo.toml"])]
+RELEASES = "/releases/latest"
+LINK = re.compile(rf"https?://[^\s()]+(?={RELEASES}\b)")
+MANIFEST = re.compile(r'(?<=^repository = ")[^"]*', re.M)
+# Anything that a reader may take for an address, on the sites that have projects and packages or with its scheme.
+WEB = re.compile(r"(?:\w+://(?:[\w.-]+@)?|git@)[\w.-]+[^\s<>()\[\]{}\"'`|]*"
+                 r"|\b(?:github\.com|gitlab\.com|codeberg\.org|docs\.rs|lib\.rs|crates\.io|pypi\.org|npmjs\.com|readthedocs\.io"
+                 r"|registry\.platformio\.org|components\.espressif\.com|reference\.arduino\.cc)/[^\s<>()\[\]{}\"'`|]*")
+# What has the settings themselves, and planted faults.
+NOT_LOOKED_AT = re.compile(r"packaging/project\.toml|scripts/(tests/|check/site$)")
 
 
 class Way(NamedTuple):
@@ -86,6 +99,34 @@ WAYS = {
 }
 
 
+def strays(text: str, repository: str, published: bool) -> list:
+    """The addresses of the project in a text that it does not have. An address is the project's if it begins with the
+    repository's or has the word mbm."""
+    own = [web.rstrip(".,;:/") for web in WEB.findall(text)]
+    name = re.compile(r"(?<![a-z0-9])mbm(?![a-z0-9_])", re.I)
+    own = [web for web in own if web.startswith(repository) or name.search(web) and not web.startswith("file:")]
+    has = [repository, repository + RELEASES] if published else []
+    return [web for web in own if web not in has]
+
+
+def files(root: pathlib.Path) -> list:
+    """The files of the project, with the names that a check shows."""
+    listed = subprocess.run(["git", "ls-files"], cwd=root, text=True, capture_output=True)
+    if listed.returncode:  # a tarball
+        names = [path.relative_to(root).as_posix() for path in root.rglob("*")
+                 if path.is_file() and path.relative_to(root).parts[0] not in ("build", "target", "dist")]
+    else:
+        names = listed.stdout.splitlines()
+    return [(name, root / name) for name in sorted(names) if (root / name).is_file() and not NOT_LOOKED_AT.match(name)]
+
+
+def unreal(root: pathlib.Path, repository: str, published: bool) -> list:
+    """What is wrong with the addresses in all files of the project: pages, manifests, sources, examples."""
+    why = "that is neither the repository nor its latest release" if published else "nothing is published"
+    return [f"{name} has the address {web}, and {why}" for name, path in files(root)
+            for web in strays(path.read_text(encoding="utf-8", errors="ignore"), repository, published)]
+
+
 def found(root: pathlib.Path, patterns: list) -> list:
     return [path for pattern in patterns for path in sorted(root.glob(pattern))]
 
@@ -93,10 +134,10 @@ def found(root: pathlib.Path, patterns: list) -> list:
 def addresses(root: pathlib.Path, address: str, published: bool, write: bool, ways: dict = WAYS) -> list:
     """Writes the address and the ways to get mbm everywhere if `write` says so. Returns what is wrong."""
     wrong = []
-    for place, patterns in ADDRESS:
+    for place, right, patterns in [(LINK, address, ["README.md", "docs/*.md"]), (MANIFEST, address if published else "", ["Cargo.toml"])]:
         for path in found(root, patterns):
             text = path.read_text(encoding="utf-8")
-            new = place.sub(address, text)
+            new = place.sub(right, text)
             if new != text and write:
                 path.write_text(new, encoding="utf-8")
             elif new != text:
@@ -123,10 +164,11 @@ def main() -> None:
     if sys.argv[1:] not in ([], ["--check"]):
         sys.exit(__doc__)
     wrong = addresses(ROOT, fact("repository"), fact("published"), not sys.argv[1:])
+    wrong += unreal(ROOT, fact("repository"), fact("published"))
     if wrong:
         sys.exit("\n".join(f"address: {what}" for what in wrong))
-    print(f"address: pages and Cargo.toml have {fact('repository')}, " +
-          ("with releases" if fact("published") else "without a release"))
+    print(f"address: the files of the project have {fact('repository')} and its latest release, and no other address of it" if fact("published") else
+          "address: nothing is published, and no file of the project has an address of it")
 
 
 if __name__ == "__main__":

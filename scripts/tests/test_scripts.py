@@ -4,6 +4,7 @@ in scripts/build/archive. `make test-scripts` has the
 library for the SBOM."""
 import contextlib
 import copy
+import importlib
 import os
 import pathlib
 import shutil
@@ -191,7 +192,7 @@ class Address(unittest.TestCase):
         self.assertEqual(self.wrong(), ['docs/guide-a.md does not begin with "[Get it](https://old.example/a/releases/latest).": run `make address`'])
 
     def test_without_a_release_a_page_says_how_to_make_the_package(self):
-        self.assertEqual(len(self.wrong(published=False)), 2)
+        self.assertEqual(len(self.wrong(published=False)), 3)
         self.assertEqual(self.wrong(published=False, write=True), [])
         self.assertEqual(self.guide.read_text(), "# A\n\nMake it: `make a`.\n\n## B\n")
         self.assertEqual(self.wrong(published=True, write=True), [])
@@ -202,9 +203,97 @@ class Address(unittest.TestCase):
         self.guide.write_text(self.guide.read_text() + "\n[Get it](https://old.example/a/releases/latest).\n")
         self.assertEqual(self.wrong(published=False), ["docs/guide-a.md has a link to a release, and none is published"])
 
+    def test_without_a_release_the_manifest_has_no_address(self):
+        self.wrong(published=False, write=True)
+        self.assertIn('repository = ""\n', (self.root / "Cargo.toml").read_text())
+        self.wrong(published=True, write=True)
+        self.assertIn('repository = "https://old.example/a"\n', (self.root / "Cargo.toml").read_text())
+
     def test_a_new_guide_needs_its_way(self):
         (self.root / "docs/guide-b.md").write_text("# B\n")
         self.assertEqual(self.wrong(), ["docs/guide-b.md: scripts/build/project.py does not say how a reader gets mbm"])
+
+
+REPOSITORY = "https://forge.example/us/mbm"
+# What may stand in a page, a manifest, a man page or an example while nothing is published, and what may not.
+HARMLESS = ["https://modbus.org/", "see https://github.com/epsilonrt/mbpoll", "`mbm read tcp://127.0.0.1:1502 100 2`", "file:///home/you/mbm",
+         "github.com/particle-iot/device-os/issues/776", "src/mbm.rs/x", "https://example.com/mbm_port.h"]
+STRAYS = [REPOSITORY, f"[it]({REPOSITORY}/releases/latest)", f"{REPOSITORY}/issues/3", "https://docs.rs/mbm", "docs.rs/mbm/0.2.0/mbm",
+         "https://crates.io/crates/mbm", "https://registry.platformio.org/libraries/us/mbm", "git@forge.example:us/mbm.git",
+         "ssh://git@forge.example/us/mbm", "https://mbm.readthedocs.io", 'Homepage: https://mbm.example', '.UR https://forge.example/other/mbm']
+
+
+class Unreal(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+
+    def unreal(self, text, published, file="docs/a.md"):
+        path = self.root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return project.unreal(self.root, REPOSITORY, published)
+
+    def test_while_nothing_is_published_every_address_of_the_project_is_found(self):
+        for text in HARMLESS:
+            self.assertEqual(self.unreal(text, False), [], text)
+        for text in STRAYS:
+            self.assertEqual(len(self.unreal(text, False)), 1, text)
+
+    def test_it_is_found_in_a_manifest_a_man_page_and_an_example(self):
+        for file in ("packaging/x/library.properties", "cli/man/mbm.1.in", "examples/linux/a.c", "README.md", "include/mbm.h"):
+            self.assertEqual(self.unreal(f"at {REPOSITORY}.", False, file), [f"{file} has the address {REPOSITORY}, and nothing is published"])
+            (self.root / file).unlink()
+
+    def test_once_published_only_the_repository_and_its_latest_release_are_there(self):
+        for text in [REPOSITORY, f"[it]({REPOSITORY}/releases/latest)", *HARMLESS]:
+            self.assertEqual(self.unreal(text, True), [], text)
+        for text in STRAYS[2:]:
+            self.assertEqual(len(self.unreal(text, True)), 1, text)
+
+    def test_the_project_has_no_address_that_it_does_not_have(self):
+        self.assertEqual(project.unreal(ROOT, project.fact("repository"), project.fact("published")), [])
+
+
+class BothStates(unittest.TestCase):
+    """The project's own pages and manifests, as they are now and once the project is published."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        (self.root / "docs").mkdir()
+        for path in [ROOT / "README.md", ROOT / "Cargo.toml", *sorted((ROOT / "docs").glob("*.md"))]:
+            shutil.copy(path, self.root / path.relative_to(ROOT))
+
+    def texts(self):
+        return {path.relative_to(self.root).as_posix(): path.read_text(encoding="utf-8") for path in self.root.rglob("*") if path.is_file()}
+
+    def test_a_published_project_has_a_download_in_each_page_that_a_user_begins_with_and_back_again_none(self):
+        repository, now = project.fact("repository"), project.fact("published")
+        before = self.texts()
+        for published in (not now, now):
+            self.assertEqual(project.addresses(self.root, repository, published, True), [])
+            self.assertEqual(project.addresses(self.root, repository, published, False), [])
+            self.assertEqual(project.unreal(self.root, repository, published), [])
+            for page in project.WAYS:
+                begin = self.texts()[page].partition("\n## ")[0]
+                self.assertEqual(f"({repository}/releases/latest)" in begin, published, page)
+                self.assertEqual("No release is published" in begin or "no release is published" in begin, not published, page)
+        self.assertEqual(self.texts(), before)
+
+    def test_packages_name_the_address_only_once_it_is_published(self):
+        sys.path.insert(0, str(ROOT / "scripts/build"))
+        self.addCleanup(sys.path.remove, str(ROOT / "scripts/build"))
+        scripts_project = importlib.import_module("project")
+        for published in (True, False):
+            facts = dict(repository=REPOSITORY, published=published, authors="us", description="it")
+            with unittest.mock.patch.object(scripts_project, "fact", facts.get):
+                for script, text in (("packaging/arduino/library", lambda module: module.properties()),
+                                     ("packaging/platformio/pack", lambda module: str(module.manifest([])))):
+                    module = load(script)
+                    self.assertEqual(REPOSITORY in text(module), published, script)
 
 
 def program(path, *lines):
