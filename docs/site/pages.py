@@ -103,10 +103,11 @@ class Site:
             words = f"[{self.titles[file]}]" if file in self.titles and found[1].endswith(".md]") else found[1]
             return f"{words}({relative(place, page)}{anchor or ''})"
 
-        # Code, links and the rest in turn, so that code in the text of a link gets no link of its own.
-        parts = re.split(r"(!?\[(?:`[^`]*`|[^\]`])*\]\([^)\s]+\)|`[^`]+`)", line)
+        # Code, links and the rest in turn, so that code in the text of a link gets no link of its own. The text of a link may
+        # begin in the line before or end in the next one.
+        parts = re.split(r"(^(?:`[^`]*`|[^\[\]`])*\]\([^)\s]+\)|!?\[(?:`[^`]*`|[^\]`])*\]\([^)\s]+\)|\[(?:`[^`]*`|[^\]`])*$|`[^`]+`)", line)
         for number, part in enumerate(parts):
-            if part.startswith("`") and not line.startswith("#"):
+            if re.fullmatch(r"`[^`]+`", part) and not line.startswith("#"):
                 parts[number] = self.code(part, page)
             elif number % 2:
                 parts[number] = re.sub(r"(.*\])\(([^)\s]+)\)", link, part)
