@@ -4,8 +4,8 @@ like. A browser would also break `--option` and `c-tests` after a hyphen, and a 
 import html
 import re
 
-# The most letters that fit a line of a phone: in a block of code, in one of rustdoc, and in a text.
-BLOCK, RUST, TEXT = 48, 40, 40
+# The most letters that fit a line of a phone, in a block of code and in a text: of the site's pages, and of rustdoc's.
+SITE, RUST = (48, 40), (40, 30)
 TAGS = re.compile(r"(<[^>]*>)")
 
 
@@ -43,9 +43,9 @@ def kept(code, longest):
     return "".join(parts)
 
 
-def broken_well(page, block=BLOCK):
+def broken_well(page, longest=SITE):
     """The HTML of a page, with its code as `kept` has it."""
     def code(found):
-        return kept(found[0], block if found[0].startswith("<pre") else TEXT)
+        return kept(found[0], longest[0] if found[0].startswith("<pre") else longest[1])
 
     return re.sub(r"<pre\b.*?</pre>|<code\b.*?</code>|<h\d\b[^>]*\bclass=\"name\"[^>]*>.*?</h\d>", code, page, flags=re.S)
