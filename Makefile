@@ -31,7 +31,7 @@ PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
 LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
 # Those with a wire in memory. The others have lwIP's own thread.
-LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_porttest_lwip,$(LWIP_TESTS))
+LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_lwip_sockets test_porttest_lwip,$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PICO_TESTS := $(filter test_pico test_porttest_pico,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
@@ -301,7 +301,7 @@ $(BUILD)/$(1)/%.o: ports/%.c
 $(BUILD)/$(1)/mbm: $(TOOL:%.c=$(BUILD)/$(1)/%.o) $(TOOL_PORTS:ports/%.c=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $(TOOL_LIBS) -o $$@
 $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(SUPPORT))) $(or $(5),$(ARCHIVE))
-	@$(3) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
+	@$(3) $(4) $$(filter-out $$(WITHOUT),$$(filter %.o,$$^)) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
 $(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
@@ -311,6 +311,8 @@ $(PICO_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model 
 $(PICO_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
+$(BUILD)/$(1)/test_wiznet: $(patsubst %,$(BUILD)/$(1)/wiznet/%.o,chip_model mbm_wiznet)
+$(BUILD)/$(1)/test_wiznet: INCLUDES += -Ic-tests/wiznet -Iports/wiznet
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
@@ -318,6 +320,13 @@ $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,lwip_w
 $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): LIBS += -Wl$(comma)--wrap=tcp_write$(comma)--wrap=tcp_new_ip_type
 $(BUILD)/$(1)/test_lwip_examples: $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve)
 $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve): INCLUDES += -Dmain=example_$$(notdir $$*)
+# The same sources as on Linux, in place of those objects.
+$(BUILD)/$(1)/over_lwip/%.o: ports/linux/%.c
+	@mkdir -p $$(@D)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
+$(BUILD)/$(1)/test_lwip_sockets: $(patsubst %,$(BUILD)/$(1)/%.o,over_lwip/mbm_tcp over_lwip/mbm_tcp_listener $(addprefix lwip/,lwip_relay mbm_lwip_sockets serve_sockets client_sockets))
+$(BUILD)/$(1)/test_lwip_sockets: INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
+$(BUILD)/$(1)/test_lwip_sockets: WITHOUT = $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/linux/*.c)) $(BUILD)/$(1)/support/tcp_waiting.o
 $(patsubst %,$(BUILD)/$(1)/test_%,lwip_task porttest_lwip): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o

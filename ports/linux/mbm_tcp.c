@@ -2,16 +2,69 @@
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 
+#include <string.h>
+
+/* The same sources are the port over the sockets of lwIP. */
+#ifdef MBM_TCP_OVER_LWIP
+#include "mbm_lwip_sockets.h"
+#else
 #include <errno.h>
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
+
+/* The shortest wait that poll does instead of ppoll: there a millisecond does not matter, and poll
+ * costs less. */
+enum { MBM_TCP_LONG_WAIT_US = 100000 };
+
+/* Keeps a descriptor from the programs that this one starts. */
+static inline int mbm_tcp_hideFromPrograms(int fd)
+{
+    return fcntl(fd, F_SETFD, FD_CLOEXEC);
+}
+
+static inline int mbm_tcp_pollFor(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
+{
+    if (timeoutUs >= MBM_TCP_LONG_WAIT_US)
+        return poll(waits, count, timeoutUs == MBM_TCP_FOREVER ? -1 : (int)(timeoutUs / 1000 + 1));
+    return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
+}
+
+/* Linux gives up by itself what a peer does not acknowledge: TCP_USER_TIMEOUT. */
+static inline void mbm_tcp_noteWritten(mbm_tcp *tcp)
+{
+    (void)tcp;
+}
+
+static inline void mbm_tcp_noteRead(mbm_tcp *tcp)
+{
+    (void)tcp;
+}
+
+static inline void mbm_tcp_dropUnsent(mbm_tcp *tcp)
+{
+    (void)tcp;
+}
+
+static inline void mbm_tcp_sleep(uint32_t micros)
+{
+    usleep(micros);
+}
+
+static inline int64_t mbm_tcp_microseconds(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + (uint32_t)now.tv_nsec / 1000u;
+}
+
+#endif
 
 /* Values of mbm_tcp.state. A lost socket keeps its place, since an object may still use it. */
 enum { FREE, CONNECTING, CONNECTED, LOST };
@@ -20,8 +73,8 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
  * if it does not acknowledge a sent byte for UNACKNOWLEDGED_MS. */
 enum { IDLE_S = 15, PROBE_INTERVAL_S = 5, PROBE_COUNT = 3, UNACKNOWLEDGED_MS = 30000 };
 
-/* The sleep after poll has failed, and the shortest wait that poll does instead of ppoll. */
-enum { POLL_RETRY_US = 10000, LONG_WAIT_US = 100000 };
+/* The sleep after poll has failed. */
+enum { POLL_RETRY_US = 10000 };
 
 /* For functions that are rarely called: keeps them apart from those of every request. */
 #define COLD __attribute__((cold, noinline))
@@ -34,6 +87,7 @@ static int refuse(int error)
     return -1;
 }
 
+#ifndef MBM_TCP_OVER_LWIP
 /* Uses the cheapest clock, since it is read with every request. */
 COLD int64_t mbm_tcp_milliseconds(void)
 {
@@ -46,6 +100,7 @@ COLD int64_t mbm_tcp_milliseconds(void)
 #endif
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
+#endif
 
 static int has_socket(const mbm_tcp *tcp)
 {
@@ -142,7 +197,7 @@ static void set(int fd, int level, int option, int value)
 
 static int prepare(int fd)
 {
-    if (ioctl(fd, FIONBIO, &(int){1}) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
+    if (ioctl(fd, FIONBIO, &(int){1}) < 0 || mbm_tcp_hideFromPrograms(fd) < 0)
         return -1;
     set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
     set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
@@ -174,6 +229,7 @@ static int try_next(mbm_tcp *tcp, int error)
             if (!failed || errno == EINPROGRESS || errno == EINTR) {
                 tcp->fd = fd;
                 tcp->error = failed ? ETIMEDOUT : 0;
+                mbm_tcp_noteRead(tcp);
                 enter(tcp, failed ? CONNECTING : CONNECTED);
                 return has_socket(tcp) ? 0 : -1;
             }
@@ -185,6 +241,7 @@ static int try_next(mbm_tcp *tcp, int error)
     return -1;
 }
 
+#ifndef MBM_TCP_OVER_LWIP
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
                    int *error)
 {
@@ -201,6 +258,7 @@ int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addr
     default: return refuse(ENXIO);
     }
 }
+#endif
 
 /* Finds the server's addresses. If that fails, those that were found before stay. */
 static int look_up(mbm_tcp *tcp)
@@ -361,6 +419,8 @@ void mbm_tcp_disconnect(void *context)
     /* An address that does not answer must not keep the next attempt from those after it. */
     if (tcp->state == CONNECTING && tcp->addresses)
         tcp->addresses->first = tcp->addresses->next;
+    if (tcp->addresses)
+        mbm_tcp_dropUnsent(tcp);
     leave_socket(tcp, LOST, tcp->state == CONNECTING ? ETIMEDOUT : ENOTCONN);
 }
 
@@ -371,7 +431,13 @@ COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
         return -1;
     if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
         return 0;
-    leave_socket(tcp, LOST, count < 0 ? errno : EPIPE);
+    tcp->error = count < 0 ? errno : EPIPE;
+    if (tcp->addresses) {
+        /* lwIP may have queued the bytes of a write that failed, for lack of a route. */
+        mbm_tcp_noteWritten(tcp);
+        mbm_tcp_dropUnsent(tcp);
+    }
+    leave_socket(tcp, LOST, tcp->error);
     return -1;
 }
 
@@ -427,6 +493,7 @@ static int16_t tcp_read(void *context, uint8_t *bytes, uint16_t capacity)
     if (count <= 0)
         return none_moved(tcp, count);
     note_activity(tcp);
+    mbm_tcp_noteRead(tcp);
     return (int16_t)count;
 }
 
@@ -441,6 +508,7 @@ COLD static int16_t finish_write(mbm_tcp *tcp, ssize_t length, ssize_t count)
     if (count <= 0)
         return 0;
     note_activity(tcp);
+    mbm_tcp_noteWritten(tcp);
     return (int16_t)count;
 }
 
@@ -468,6 +536,7 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return finish_write(tcp, all, count);
     report_again(tcp);
     note_activity(tcp);
+    mbm_tcp_noteWritten(tcp);
     /* If the next read or write comes without a look at the clock, this time is too old for it. */
     tcp->clockUs = 0;
     return (int16_t)count;
@@ -476,10 +545,8 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
 static uint32_t tcp_micros(void *context)
 {
     mbm_tcp *tcp = (mbm_tcp *)context;
-    struct timespec now;
 
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    tcp->clockUs = (int64_t)now.tv_sec * 1000000 + (uint32_t)now.tv_nsec / 1000u;
+    tcp->clockUs = mbm_tcp_microseconds();
     return (uint32_t)tcp->clockUs;
 }
 
@@ -501,7 +568,7 @@ COLD static int after_failed_poll(uint32_t timeoutUs)
 {
     if (errno == EINTR)
         return 0;
-    usleep(timeoutUs < POLL_RETRY_US ? timeoutUs : POLL_RETRY_US);
+    mbm_tcp_sleep(timeoutUs < POLL_RETRY_US ? timeoutUs : POLL_RETRY_US);
     return 1;
 }
 
@@ -520,14 +587,6 @@ static inline void note_events(mbm_tcp *tcp, short events)
         (void)progress(tcp);
     else if (events & ~POLLOUT)
         tcp->readiness |= MBM_TCP_REPORTED;
-}
-
-/* In a long wait a millisecond does not matter, and poll costs less than ppoll. */
-static inline int sleep_on(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
-{
-    if (timeoutUs >= LONG_WAIT_US)
-        return poll(waits, count, timeoutUs == MBM_TCP_FOREVER ? -1 : (int)(timeoutUs / 1000 + 1));
-    return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
 
 COLD static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, int fd,
@@ -550,7 +609,7 @@ COLD static int wait_for_many(mbm_tcp *tcps, size_t count, const mbm_tcp_listene
         waits[used++] = (struct pollfd){listener->fd, POLLIN, 0};
     if (fd >= 0)
         waits[used++] = (struct pollfd){fd, POLLIN, 0};
-    ready = sleep_on(waits, used, timeoutUs);
+    ready = mbm_tcp_pollFor(waits, used, timeoutUs);
     if (ready < 0)
         return after_failed_poll(timeoutUs);
     used = 0;
@@ -570,7 +629,7 @@ int mbm_tcp_wait(mbm_tcp *tcps, size_t count, const mbm_tcp_listener *listener, 
     if (count != 1 || listener || fd >= 0 || tcps->readiness || tcps->events != POLLIN)
         return wait_for_many(tcps, count, listener, fd, timeoutUs);
     wait = (struct pollfd){tcps->fd, POLLIN, 0};
-    ready = sleep_on(&wait, 1, timeoutUs);
+    ready = mbm_tcp_pollFor(&wait, 1, timeoutUs);
     if (ready < 0)
         return after_failed_poll(timeoutUs);
     if (ready > 0)

@@ -21,7 +21,11 @@
 #include "mbm.h"
 
 #include <stddef.h>
+#ifdef MBM_TCP_OVER_LWIP
+#include "mbm_lwip_limits.h" /* the port over lwIP's sockets: docs/guide-lwip.md */
+#else
 #include <sys/socket.h>
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -33,21 +37,23 @@ extern "C" {
 /** For mbm_tcp_wait: no time limit. */
 #define MBM_TCP_FOREVER UINT32_MAX
 
+#ifndef MBM_TCP_OVER_LWIP
 /** Most addresses of one name that are tried, one after the other. */
 #define MBM_TCP_ADDRESSES 4
 
 /** Most sockets that one mbm_tcp_wait looks at. */
 #define MBM_TCP_WAITS 256
 
+/** The longest name of a host, and of a service, with the terminating zero. */
+#define MBM_TCP_HOST_BYTES 256
+#define MBM_TCP_SERVICE_BYTES 32
+#endif
+
 /** Most sockets of a set that one mbm_tcp_waitSet reports. The next one reports the others. */
 #define MBM_TCP_READY 64
 
 /** Microseconds after which to call mbm_tcp_accept again if it found no descriptor. */
 #define MBM_TCP_RETRY 100000u
-
-/** The longest name of a host, and of a service, with the terminating zero. */
-#define MBM_TCP_HOST_BYTES 256
-#define MBM_TCP_SERVICE_BYTES 32
 
 /** A server and its addresses, for a client that connects to it. The program provides the
  *  memory, mbm_tcp_open or mbm_tcp_openLater fills it. */

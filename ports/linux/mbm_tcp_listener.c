@@ -2,13 +2,31 @@
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 
+#include <string.h>
+
+#ifdef MBM_TCP_OVER_LWIP
+#include "mbm_lwip_sockets.h"
+#else
 #include <errno.h>
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
-#include <string.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
+
+/* Keeps a descriptor from the programs that this one starts. */
+static inline int mbm_tcp_hideFromPrograms(int fd)
+{
+    return fcntl(fd, F_SETFD, FD_CLOEXEC);
+}
+
+/* A second descriptor of the same socket; -1 if the system refuses. */
+static inline int mbm_tcp_duplicate(int fd)
+{
+    return fcntl(fd, F_DUPFD_CLOEXEC, 1);
+}
+#endif
 
 /* The most connections that one mbm_tcp_accept turns away, so that a flood of connections
  * does not keep a program from those that it serves. */
@@ -40,8 +58,10 @@ static uint16_t port_of(int fd)
     memset(&address, 0, sizeof address);
     if (getsockname(fd, (struct sockaddr *)&address, &size) < 0)
         return 0;
+#if !defined MBM_TCP_OVER_LWIP || LWIP_IPV6
     if (address.ss_family == AF_INET6)
         return ntohs(((struct sockaddr_in6 *)&address)->sin6_port);
+#endif
     return ntohs(((struct sockaddr_in *)&address)->sin_port);
 }
 
@@ -53,7 +73,7 @@ static int listen_at(const struct addrinfo *address)
         return -1;
     /* Without this, a server that restarts could not listen, because of its old connections. */
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    if (fcntl(fd, F_SETFL, O_NONBLOCK) == 0 && fcntl(fd, F_SETFD, FD_CLOEXEC) == 0 &&
+    if (ioctl(fd, FIONBIO, &(int){1}) == 0 && mbm_tcp_hideFromPrograms(fd) == 0 &&
         bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
         return fd;
     error = errno;
@@ -66,7 +86,7 @@ static int listen_at(const struct addrinfo *address)
 static void keep_spare(mbm_tcp_listener *listener)
 {
     if (listener->spare == 0)
-        listener->spare = fcntl(listener->fd, F_DUPFD_CLOEXEC, 1);
+        listener->spare = mbm_tcp_duplicate(listener->fd);
     if (listener->spare < 0)
         listener->spare = 0;
 }

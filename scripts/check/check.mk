@@ -63,8 +63,8 @@ KIT ?=
 FOLDER ?=
 BOARDS ?=
 .PHONY: check-real
-check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, lwip, stm32, pico or another library, FOLDER=its folder
-	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev libcmocka-dev gcc-arm-none-eabi libnewlib-arm-none-eabi g++ gcc-avr avr-libc arduino-core-avr \
+check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, lwip, freertos-lwip, wiznet, stm32, pico or another library, FOLDER=its folder
+	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev libcmocka-dev libmodbus-dev gcc-arm-none-eabi libnewlib-arm-none-eabi g++ gcc-avr avr-libc arduino-core-avr \
 		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm
 	@$(MAKE) --no-print-directory BOARDS= assembler $(BUILD)/plain/mbm
 	@scripts/check/real $(KIT) $(FOLDER) $(BOARDS)
