@@ -4,8 +4,7 @@
 
 #include "mbm.h"
 
-/* A task that serves ten holding registers from address 0 as unit 1. Called where lwIP runs:
- * before. */
+/* A task that serves ten holding registers from address 0 as unit 1. */
 void form_serve(void *none);
 extern const char form_name[];
 
@@ -15,8 +14,8 @@ void form_open(uint16_t port, mbm_port *to, mbm_linkHooks *hooks);
 /* Sleeps until bytes come, at most for this time. */
 void form_wait(uint32_t timeoutUs);
 
-/* Begins a second client, the example, if there is one. Returns the reads that have ended, of which
- * `right` as the value of libmodbus's server is. */
+/* Begins the example as a second client, if the form has one. form_exampleReads returns how many of
+ * its reads have ended, or 0 while the last one is wrong. */
 void form_beginExample(uint16_t port);
 uint32_t form_exampleReads(void);
 
