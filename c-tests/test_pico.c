@@ -89,6 +89,29 @@ TEST(a_frame_longer_than_the_fifo_is_taken_whole_and_sent_by_the_interrupt)
     assert_int_equal(port.flush(port.context), 1);
 }
 
+/* The interrupt for received characters, as an echo or noise make it, comes in the middle of a
+ * write. */
+static void hear(void)
+{
+    if (uart_get_hw(uart1)->fr & UART_UARTFR_BUSY_BITS) {
+        chip.putting = NULL;
+        receive(request, 4);
+    }
+}
+
+TEST(an_interrupt_in_a_write_neither_repeats_a_byte_nor_holds_the_line)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    chip.putting = hear;
+    assert_int_equal(port.write(port.context, response, sizeof response), sizeof response);
+    while (pico_send())
+        ;
+    assert_int_equal(chip.sent, sizeof response);
+    assert_memory_equal(chip.line, response, sizeof response);
+    assert_int_equal(port.flush(port.context), 1);
+    assert_int_equal(port.write(port.context, response, sizeof response), sizeof response);
+}
+
 TEST(what_is_in_the_fifo_is_read_without_an_interrupt)
 {
     uint8_t taken[RECEIVED];

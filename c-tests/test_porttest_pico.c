@@ -21,12 +21,6 @@ static void say(void *context, mbm_portFinding kind, const char *sentence)
     print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
 }
 
-static uint32_t reference(void *context)
-{
-    (void)context;
-    return chip.now;
-}
-
 /* --- UART */
 
 /* When the character that is leaving has left, and since when nothing has come. */
@@ -135,7 +129,6 @@ TEST(the_port_for_the_uart_of_a_pico)
     test.begin = open_uart;
     test.disturb = disturb;
     test.yield = yield;
-    test.reference = reference;
     assert_int_equal(mbm_portTest_run(&test), 0);
     assert_int_equal(test.advice, 0);
     assert_int_equal(test.leftOut, 0);

@@ -132,6 +132,8 @@ bool uart_is_writable(uart_inst_t *uart)
 
 void uart_putc_raw(uart_inst_t *uart, char character)
 {
+    if (chip.putting != NULL)
+        chip.putting();
     uart->toSend[uart->toSendCount++] = (uint8_t)character;
     uart->hw.fr |= UART_UARTFR_BUSY_BITS;
 }

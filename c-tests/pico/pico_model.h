@@ -18,7 +18,8 @@ typedef struct pico {
     unsigned toHostLength;
     unsigned tasks; /* how often tud_task_ext was called */
     unsigned interrupts;
-    void (*pass)(void); /* what happens in a moment of sleep, which an interrupt ends; or NULL */
+    void (*putting)(void); /* called while the program puts a character into the FIFO; or NULL */
+    void (*pass)(void);    /* what happens in a moment of sleep, which an interrupt ends; or NULL */
 } pico;
 extern pico chip;
 

@@ -43,7 +43,10 @@ static void send(mbm_picoUart *line)
 static void interrupt(mbm_picoUart *line)
 {
     receive(line);
-    send(line);
+    /* While this is off, a write of the program puts bytes into the FIFO, and may be in the middle
+     * of one. */
+    if (uart_get_hw(line->uart)->imsc & UART_UARTIMSC_TXIM_BITS)
+        send(line);
 }
 
 static void interrupt_0(void)
