@@ -5,7 +5,7 @@ The emulator rp2040js runs those of the RP2040; libmodbus reads them over USB an
 import os
 import re
 
-OURS = re.compile(r"(ports|examples)/pico/[\w./-]*:\d+.*warning:")
+OURS = re.compile(r"(ports|examples|firmware-tests)/(pico|test|rp2040)/[\w./-]*:\d+.*warning:")
 BOARDS = ("pico", "pico2")
 EXAMPLES = (("serve_usb", "usb"), ("serve_uart", "uart"))
 
@@ -31,3 +31,16 @@ def check(kit, boards) -> None:
                   f"{int(size[1]) + int(size[2])} of RAM")
             if board == "pico":
                 print(kit.run(kit.log, [kit.root / "firmware-tests/rp2040/check", line, folder / f"{example}.elf"]), end="")
+        if board == "pico":
+            port_test(kit, environment)
+
+
+def port_test(kit, environment) -> None:
+    """Runs the test kit for ports over the UART, and prints its report."""
+    folder = kit.work / "porttest"
+    said = kit.run(kit.log, ["cmake", "-GNinja", "-S", kit.root / "firmware-tests/rp2040", "-B", folder, "-DPICO_NO_PICOTOOL=1",
+                             f"-DMBM_LIBRARY={kit.root}/build/archives/cortex-m0plus/libmbm.a"], env=environment)
+    said += kit.run(kit.log, ["ninja", "-C", folder], env=environment)
+    if OURS.search(said):
+        kit.fail("a file of mbm compiles with a warning")
+    print(kit.run(kit.log, [kit.root / "firmware-tests/rp2040/check", "porttest", folder / "porttest.elf"]), end="")
