@@ -58,7 +58,7 @@ static uint16_t port_of(int fd)
     memset(&address, 0, sizeof address);
     if (getsockname(fd, (struct sockaddr *)&address, &size) < 0)
         return 0;
-#if !defined MBM_TCP_OVER_LWIP || LWIP_IPV6
+#ifndef MBM_TCP_HAS_NO_IPV6
     if (address.ss_family == AF_INET6)
         return ntohs(((struct sockaddr_in6 *)&address)->sin6_port);
 #endif

@@ -21,6 +21,11 @@
 #error "mbm over lwIP's sockets: set LWIP_SOCKET_POLL to 1 in lwipopts.h"
 #endif
 
+/* The structure of an address of IPv6 is not there. */
+#if !LWIP_IPV6
+#define MBM_TCP_HAS_NO_IPV6
+#endif
+
 /* lwIP's own names, whatever LWIP_COMPAT_SOCKETS is. */
 #undef socket
 #undef connect
