@@ -30,6 +30,7 @@ TLS_TESTS := $(filter test_tls%,$(TESTS))
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
 LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
+LWIP_SOCKETS := over_lwip/mbm_tcp over_lwip/mbm_tcp_listener lwip/mbm_lwip_sockets lwip/serve_sockets lwip/client_sockets
 # Those with a wire in memory. The others have lwIP's own thread.
 LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_lwip_sockets test_porttest_lwip,$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
@@ -324,8 +325,9 @@ $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve): INCLUDES += -Dmain=example_$$
 $(BUILD)/$(1)/over_lwip/%.o: ports/linux/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
-$(BUILD)/$(1)/test_lwip_sockets: $(patsubst %,$(BUILD)/$(1)/%.o,over_lwip/mbm_tcp over_lwip/mbm_tcp_listener $(addprefix lwip/,lwip_relay mbm_lwip_sockets serve_sockets client_sockets))
-$(BUILD)/$(1)/test_lwip_sockets: INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
+$(BUILD)/$(1)/test_lwip_sockets: $(LWIP_SOCKETS:%=$(BUILD)/$(1)/%.o) $(BUILD)/$(1)/lwip/lwip_relay.o
+# Each by its name: what the program has, Linux's objects would inherit.
+$(patsubst %,$(BUILD)/$(1)/%.o,test_lwip_sockets $(LWIP_SOCKETS)): INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
 $(BUILD)/$(1)/test_lwip_sockets: WITHOUT = $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/linux/*.c)) $(BUILD)/$(1)/support/tcp_waiting.o
 $(patsubst %,$(BUILD)/$(1)/test_%,lwip_task porttest_lwip): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
