@@ -216,7 +216,7 @@ static void judge_driver(mbm_portTest *test, const passage *few)
 }
 
 /* The shorter times of two frames, and whatever was seen of the driver. */
-static passage both(const passage *one, const passage *other)
+static passage joined(const passage *one, const passage *other)
 {
     passage sum = *other;
 
@@ -256,7 +256,7 @@ void mbm_portTest_checkFlush(mbm_portTest *test)
 
         if (!mbm_portTest_pass(test, &again))
             return;
-        few = tries == 0 ? again : both(&few, &again);
+        few = tries == 0 ? again : joined(&few, &again);
     }
     if (port->flush == NULL && port->postTransmission != NULL && !test->mayWait)
         SAY(test, MBM_PORT_WRONG,
