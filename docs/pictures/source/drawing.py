@@ -127,6 +127,10 @@ class Drawing:
         self.steps.append(seconds)
         self.step = len(self.steps) - 1
 
+    def end_steps(self, seconds):
+        """The last step lasts for `seconds`. What is drawn from now on belongs to no step."""
+        self.steps[-1], self.step = seconds, 0
+
     def add(self, tag, bottom, content=None, **attributes):
         """Adds an element that ends at the height `bottom`. Attributes: `kind` is the class."""
         self.bottom = max(self.bottom, bottom)

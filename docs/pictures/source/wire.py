@@ -40,10 +40,14 @@ def draw():
         f"{milliseconds(length(REQUEST))}: {written[0]}. The device works. Then it sends {length(REPLY)} bytes in "
         f"{milliseconds(length(REPLY))}: {written[1]}.")
 
-    def meaning(name, data):
-        """What stands below a field."""
+    def words(name, data):
+        """What stands below a field, line by line."""
         number = int.from_bytes(data, "big")
-        return ["right"] if name == "CRC" and data == REPLY[-1][1] else [] if name == "CRC" else [str(number)]
+        if name == "CRC":
+            return [name, "right" if data == REPLY[-1][1] else ""]
+        if name.startswith("register "):
+            return [*name.split(), f"= {number}"]
+        return ["func." if name == "function" else name, str(number)]
 
     def show(y, frame, kind, seconds):
         x = MARGIN
@@ -52,10 +56,8 @@ def draw():
             width = len(data) * CELL
             for index, byte in enumerate(data):
                 drawing.box(x + index * CELL + 1, y, CELL - 2, 28, "plain" if name == "CRC" else kind, [f"{byte:02X}"], ("code", ""))
-            drawing.text(x + width / 2, y + 43, name.split()[0] if len(data) > 1 else SHORT.get(name, name), "soft", "middle")
-            drawing.text(x + width / 2, y + 59, name.split()[1] if " " in name else " ".join(meaning(name, data)), "soft", "middle")
-            if " " in name:
-                drawing.text(x + width / 2, y + 75, f"= {int.from_bytes(data, 'big')}", "soft", "middle")
+            for index, line in enumerate(words(name, data)):
+                drawing.text(x + width / 2, y + 43 + 16 * index, line, "soft", "middle")
             x += width
         return y + 59
 
@@ -65,12 +67,8 @@ def draw():
     drawing.appear(1.5)
     drawing.text(MARGIN, y + 34, f"device: {length(REPLY)} bytes, {milliseconds(length(REPLY))}", "strong", colour="theirs")
     y = show(y + 46, REPLY, "theirs", 0.7)
-    drawing.steps[-1] = 10
-    drawing.step = 0
+    drawing.end_steps(10)
     drawing.paragraph(MARGIN, y + 42, WIDTH - 2 * MARGIN,
                       f"Before the request the line is silent for {milliseconds(3.5)}. The right reply ends the call with its last byte.",
                       "soft")
     return drawing
-
-
-SHORT = {"function": "func.", "bytes": "bytes"}
