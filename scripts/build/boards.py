@@ -13,7 +13,7 @@ import pathlib
 import re
 import subprocess
 import sys
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 FOLDER = pathlib.Path(__file__).resolve().parent
 
@@ -121,10 +121,14 @@ def plain(name: str) -> str:
     return re.sub(r"[-_. ]|^arduino", "", name.lower())
 
 
+def by_plain_name() -> dict:
+    """All of names(), by their plain names."""
+    return {plain(name): name for name in names()}
+
+
 def known(name: str) -> str | None:
     """The one of names() for a board, a chip or a family as people call it; None if there is none."""
-    by_name = {plain(one): one for one in names()}
-    word = plain(name)
+    by_name, word = by_plain_name(), plain(name)
     if series := SERIES.match(word):
         return by_name.get(word) or by_name.get(f"stm32{series[1]}" if series[1] else series[2])
     return by_name.get(word)
@@ -142,8 +146,8 @@ def names() -> list:
     return list(dict.fromkeys([*FAMILIES, *archives(), *boards]))
 
 
-def refuse(name: str) -> None:
-    by_name = {plain(one): one for one in names()}
+def refuse(name: str) -> NoReturn:
+    by_name = by_plain_name()
     near = [by_name[word] for word in difflib.get_close_matches(plain(name), by_name, 3)]
     hint = f"; the nearest names are {', '.join(near)}" if near else ""
     sys.exit(f"boards: there is no board or family \"{name}\"{hint}. `scripts/build/boards.py --list` prints all names")
@@ -151,11 +155,7 @@ def refuse(name: str) -> None:
 
 def named() -> list:
     """What MBM_BOARDS names. Ends the program if it does not know one of the names."""
-    words = os.environ.get("MBM_BOARDS", "").replace(",", " ").split()
-    for word in words:
-        if not known(word):
-            refuse(word)
-    return [known(word) for word in words]
+    return [known(word) or refuse(word) for word in os.environ.get("MBM_BOARDS", "").replace(",", " ").split()]
 
 
 def boards_of(family: str) -> list:
