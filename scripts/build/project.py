@@ -76,9 +76,9 @@ def guide(what: str, file: str, command: str, more: str = "", board: str = "") -
 SDK = "mbm-sdk-VERSION.tar.gz"
 WAYS = {
     "README.md": Way("**[Download](ADDRESS/releases/latest)**, then start with",
-                     "No release is published yet: **[make the packages from a clone](#install)**, then start with"),
+                     "No release is published yet: **[build the packages from a clone](#install)**, then start with"),
     "docs/index.md": Way("**[Download](ADDRESS/releases/latest)** then start with",
-                         "**[Make it from a clone](../README.md#install)** as no release is published yet, then start with"),
+                         "**[Build it from a clone](../README.md#install)** as no release is published yet, then start with"),
     "docs/guide-arduino.md": guide("the library", "mbm-arduino-VERSION.zip", "make arduino-zip", board="uno"),
     "docs/guide-esp-idf.md": guide("the component", "mbm-esp-idf-VERSION.tar.gz", "make package KIND=esp-idf"),
     "docs/guide-platformio.md": guide("the package", "mbm-platformio-VERSION.tar.gz", "make package KIND=platformio"),
