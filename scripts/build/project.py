@@ -45,9 +45,10 @@ RELEASES = "/releases/latest"
 LINK = re.compile(rf"https?://[^\s()]+(?={RELEASES}\b)")
 MANIFEST = re.compile(r'(?<=^repository = ")[^"]*', re.M)
 # Anything that a reader may take for an address, on the sites that have projects and packages or with its scheme.
-WEB = re.compile(r"(?:\w+://(?:[\w.-]+@)?|git@)[\w.-]+[^\s<>()\[\]{}\"'`|]*"
+WEB = re.compile(r"(?:\b\w+://(?:[\w.-]+@)?|git@)[\w.-]+[^\s<>()\[\]{}\"'`|]*"
                  r"|\b(?:github\.com|gitlab\.com|codeberg\.org|docs\.rs|lib\.rs|crates\.io|pypi\.org|npmjs\.com|readthedocs\.io"
                  r"|registry\.platformio\.org|components\.espressif\.com|reference\.arduino\.cc)/[^\s<>()\[\]{}\"'`|]*")
+NAME = re.compile(r"(?<![a-z0-9])mbm(?![a-z0-9_])", re.I)
 # What has the settings themselves, and planted faults.
 NOT_LOOKED_AT = re.compile(r"packaging/project\.toml|scripts/(tests/|check/site$)")
 
@@ -102,11 +103,9 @@ WAYS = {
 def strays(text: str, repository: str, published: bool) -> list:
     """The addresses of the project in a text that it does not have. An address is the project's if it begins with the
     repository's or has the word mbm."""
-    own = [web.rstrip(".,;:/") for web in WEB.findall(text)]
-    name = re.compile(r"(?<![a-z0-9])mbm(?![a-z0-9_])", re.I)
-    own = [web for web in own if web.startswith(repository) or name.search(web) and not web.startswith("file:")]
     has = [repository, repository + RELEASES] if published else []
-    return [web for web in own if web not in has]
+    return [web for web in (each.rstrip(".,;:/") for each in WEB.findall(text)) if web not in has and
+            (web.startswith(repository) or NAME.search(web) and not web.startswith("file:"))]
 
 
 def files(root: pathlib.Path) -> list:
