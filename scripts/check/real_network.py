@@ -4,7 +4,7 @@ freertos-lwip: FOLDER has FreeRTOS-Kernel and lwip, each in the folder of its na
 QEMU's mps2-an385 with its Ethernet controller, on the loopback interface, against libmodbus and `mbm`.
 wiznet: FOLDER is ioLibrary_Driver. The examples are linked with it for a Cortex-M3, for each chip. Nothing runs: a test on this
 machine plays the chip (c-tests/test_wiznet.c)."""
-import re
+import real_lwip
 
 FORMS = ("raw", "sockets")
 CHIPS = ("W5500", "W5100S", "W5200", "W6100")
@@ -12,11 +12,7 @@ CHIPS = ("W5500", "W5100S", "W5200", "W6100")
 
 def check_lwip(kit, forms) -> None:
     kernel, lwip = kit.there(kit.tree / "FreeRTOS-Kernel"), kit.there(kit.tree / "lwip")
-    text = kit.there(kernel / "include/task.h").read_text()
-    numbers = kit.there(lwip / "src/include/lwip/init.h").read_text()
-    version = ".".join(re.search(rf"LWIP_VERSION_{part}\s+(\d+)", numbers)[1] for part in ("MAJOR", "MINOR", "REVISION"))
-    kernel_version = re.search(r'tskKERNEL_VERSION_NUMBER\s+"V([^"]+)"', text)[1]
-    kit.version = f"{version} with FreeRTOS {kernel_version}"
+    kit.version = f"{real_lwip.version(kit, lwip)} with FreeRTOS {kit.freertos_version(kernel)}"
     kit.run(kit.work / "archive.log", [kit.root / "scripts/build/archive", "cortex-m3"])
     for form in forms:
         said = kit.run(kit.work / f"{form}.log", ["make", "--no-print-directory", "-f", kit.root / "firmware-tests/lwip/Makefile",

@@ -179,9 +179,5 @@ def on_this_machine(kit, board: str) -> None:
     for test in tests:
         kit.run(kit.log, [*low, work / (test + ".o"), *shared, kit.there(root / "target/release/libmbm.a"), "-lcmocka", "-lpthread",
                           "-o", work / test])
-        said = kit.run(kit.log, [work / test])
-        passed = re.search(r"PASSED\s+\] (\d+) test", said) or re.search(r"^1\.\.(\d+)$", said, re.M)
-        if not passed or "FAILED" in said or "not ok" in said:
-            kit.fail(f"{board}: the tests over the HAL's source print:\n{said[-3000:]}")
-        count += int(passed[1])
+        count += kit.passed(work / test, f"{board}: the tests over the HAL's source print")
     print(f"real: stm32 {board}: {count} tests of the port over the source of the HAL, by DMA and by interrupt")
