@@ -22,12 +22,6 @@
  * costs less. */
 enum { MBM_TCP_LONG_WAIT_US = 100000 };
 
-/* Keeps a descriptor from the programs that this one starts. */
-static inline int mbm_tcp_hideFromPrograms(int fd)
-{
-    return fcntl(fd, F_SETFD, FD_CLOEXEC);
-}
-
 static inline int mbm_tcp_pollFor(struct pollfd *waits, nfds_t count, uint32_t timeoutUs)
 {
     if (timeoutUs >= MBM_TCP_LONG_WAIT_US)
@@ -99,6 +93,11 @@ COLD int64_t mbm_tcp_milliseconds(void)
     clock_gettime(CLOCK_MONOTONIC, &now);
 #endif
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+COLD int mbm_tcp_setFlags(int fd)
+{
+    return ioctl(fd, FIONBIO, &(int){1}) < 0 ? -1 : fcntl(fd, F_SETFD, FD_CLOEXEC);
 }
 #endif
 
@@ -197,7 +196,7 @@ static void set(int fd, int level, int option, int value)
 
 static int prepare(int fd)
 {
-    if (ioctl(fd, FIONBIO, &(int){1}) < 0 || mbm_tcp_hideFromPrograms(fd) < 0)
+    if (mbm_tcp_setFlags(fd) < 0)
         return -1;
     set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
     set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);

@@ -386,6 +386,8 @@ struct addrinfo;
 int mbm_tcp_lookUp(const char *host, const char *service, int flags, struct addrinfo **found,
                    int *error);
 int64_t mbm_tcp_milliseconds(void);
+/* No call waits for the socket, and no program that this one starts inherits it. */
+int mbm_tcp_setFlags(int fd);
 void mbm_tcp_markReady(mbm_tcp *tcp);
 void mbm_tcp_noteEvents(mbm_tcp *tcp, uint32_t events);
 void mbm_tcp_setEvents(mbm_tcp *tcp, uint8_t events);

@@ -12,14 +12,7 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
-
-/* Keeps a descriptor from the programs that this one starts. */
-static inline int mbm_tcp_hideFromPrograms(int fd)
-{
-    return fcntl(fd, F_SETFD, FD_CLOEXEC);
-}
 
 /* A second descriptor of the same socket; -1 if the system refuses. */
 static inline int mbm_tcp_duplicate(int fd)
@@ -73,8 +66,8 @@ static int listen_at(const struct addrinfo *address)
         return -1;
     /* Without this, a server that restarts could not listen, because of its old connections. */
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    if (ioctl(fd, FIONBIO, &(int){1}) == 0 && mbm_tcp_hideFromPrograms(fd) == 0 &&
-        bind(fd, address->ai_addr, address->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0)
+    if (mbm_tcp_setFlags(fd) == 0 && bind(fd, address->ai_addr, address->ai_addrlen) == 0 &&
+        listen(fd, SOMAXCONN) == 0)
         return fd;
     error = errno;
     close(fd);

@@ -1,5 +1,5 @@
-/* See mbm_lwip_sockets.h: the clock and the addresses of the port over lwIP's sockets. Licence: MIT
- * OR Apache-2.0. */
+/* See mbm_lwip_sockets.h: the clock, the flags and the addresses of the port over lwIP's sockets.
+ * Licence: MIT OR Apache-2.0. */
 #define _GNU_SOURCE
 #include "mbm_tcp.h"
 
@@ -45,6 +45,11 @@ int64_t mbm_tcp_milliseconds(void)
 int64_t mbm_tcp_microseconds(void)
 {
     return mbm_tcp_milliseconds() * 1000;
+}
+
+int mbm_tcp_setFlags(int fd)
+{
+    return lwip_ioctl(fd, FIONBIO, &(int){1});
 }
 
 static int parse_port(const char *service, uint16_t *port)

@@ -40,7 +40,6 @@
 #undef send
 #undef read
 #undef close
-#undef ioctl
 #undef poll
 #undef freeaddrinfo
 #undef gai_strerror
@@ -59,7 +58,6 @@
 #define send(fd, bytes, length, flags) lwip_send(fd, bytes, length, flags)
 #define read(fd, bytes, length) lwip_read(fd, bytes, length)
 #define close(fd) lwip_close(fd)
-#define ioctl(fd, request, value) lwip_ioctl(fd, request, value)
 #define poll(waits, count, timeout) lwip_poll(waits, count, timeout)
 #define freeaddrinfo(found) mbm_lwip_freeAddresses(found)
 #define gai_strerror(error) "lwIP found no address of this name"
@@ -83,14 +81,8 @@ void mbm_lwip_freeAddresses(struct addrinfo *found);
 /* The clock is lwIP's sys_now, and so in whole milliseconds. */
 int64_t mbm_tcp_microseconds(void);
 
-/* lwIP has no other programs, and no second descriptor of a socket. A connection that finds no
- * descriptor is closed by lwIP itself. */
-static inline int mbm_tcp_hideFromPrograms(int fd)
-{
-    (void)fd;
-    return 0;
-}
-
+/* lwIP has no second descriptor of a socket. A connection that finds no descriptor is closed by
+ * lwIP itself. */
 static inline int mbm_tcp_duplicate(int fd)
 {
     (void)fd;
