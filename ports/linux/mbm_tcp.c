@@ -418,25 +418,23 @@ void mbm_tcp_disconnect(void *context)
     /* An address that does not answer must not keep the next attempt from those after it. */
     if (tcp->state == CONNECTING && tcp->addresses)
         tcp->addresses->first = tcp->addresses->next;
-    if (tcp->addresses)
-        mbm_tcp_dropUnsent(tcp);
+    mbm_tcp_dropUnsent(tcp);
     leave_socket(tcp, LOST, tcp->state == CONNECTING ? ETIMEDOUT : ENOTCONN);
 }
 
 /* No bytes were moved. Returns 0 for a signal or if there are none yet, -1 for a lost link. */
 COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
 {
+    const int error = count < 0 ? errno : EPIPE;
+
     if (tcp->state == LOST)
         return -1;
-    if (count < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR))
+    if (error == EAGAIN || error == EWOULDBLOCK || error == EINTR)
         return 0;
-    tcp->error = count < 0 ? errno : EPIPE;
-    if (tcp->addresses) {
-        /* lwIP may have queued the bytes of a write that failed, for lack of a route. */
-        mbm_tcp_noteWritten(tcp);
-        mbm_tcp_dropUnsent(tcp);
-    }
-    leave_socket(tcp, LOST, tcp->error);
+    /* lwIP may have queued the bytes of a write that failed, for lack of a route. */
+    mbm_tcp_noteWritten(tcp);
+    mbm_tcp_dropUnsent(tcp);
+    leave_socket(tcp, LOST, error);
     return -1;
 }
 

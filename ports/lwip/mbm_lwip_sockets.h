@@ -98,8 +98,8 @@ static inline int mbm_tcp_pollFor(struct pollfd *waits, nfds_t count, uint32_t t
 }
 
 /* lwIP sends what was written before a close for minutes, and so perhaps a request that the program
- * has given up long ago. A connection without an answer to the last bytes is reset instead. This
- * needs LWIP_SO_LINGER. */
+ * has given up long ago. So a client's connection without an answer to the last bytes is reset.
+ * This needs LWIP_SO_LINGER. */
 enum { MBM_TCP_UNANSWERED = 4 }; /* in mbm_tcp.readiness */
 
 static inline void mbm_tcp_noteWritten(mbm_tcp *tcp)
@@ -116,7 +116,7 @@ static inline void mbm_tcp_dropUnsent(mbm_tcp *tcp)
 {
     struct linger now;
 
-    if (!(tcp->readiness & MBM_TCP_UNANSWERED))
+    if (!(tcp->readiness & MBM_TCP_UNANSWERED) || tcp->addresses == NULL)
         return;
     tcp->readiness &= (uint8_t)~MBM_TCP_UNANSWERED;
     now.l_onoff = 1;
