@@ -87,9 +87,9 @@ static err_t report(mbm_lwip *link, struct tcp_pcb *pcb)
     return result;
 }
 
-/* Returns whether there is place for more bytes. Many small segments are joined, so that their
- * pbufs are free. */
-static uint8_t has_place_for(mbm_lwip *link, const struct pbuf *more)
+/* Returns whether there is place for more bytes. Joins many small segments, so that their pbufs are
+ * free. */
+static uint8_t make_place_for(mbm_lwip *link, const struct pbuf *more)
 {
     const struct pbuf *held = link->received;
 
@@ -109,7 +109,7 @@ static err_t on_received(void *context, struct tcp_pcb *pcb, struct pbuf *p, err
         link->flags |= MBM_LWIP_IS_ENDED;
     else if (link->received == NULL)
         link->received = p;
-    else if (has_place_for(link, p))
+    else if (make_place_for(link, p))
         pbuf_cat(link->received, p);
     else
         return ERR_MEM; /* lwIP keeps it, tries again, and drops what comes after it */
@@ -303,8 +303,9 @@ void mbm_lwip_disconnect(void *context)
     MBM_LWIP_GIVE(link);
 }
 
-/* Returns whether the link is lost, and all that came over it was read. */
-static uint8_t is_lost(mbm_lwip *link)
+/* Returns whether the link is lost, and all that came over it was read. Ends a connection that its
+ * peer has closed. */
+static uint8_t notice_loss(mbm_lwip *link)
 {
     if (link->flags & MBM_LWIP_IS_SUCCESSOR)
         return 1;
@@ -323,7 +324,7 @@ uint8_t mbm_lwip_status(void *context)
     if (link == NULL)
         return MBM_INVALID_ARGUMENT;
     MBM_LWIP_TAKE(link);
-    if (is_lost(link))
+    if (notice_loss(link))
         status = link->error == ERR_TIMEOUT ? MBM_CONNECT_TIMED_OUT : MBM_LINK_LOST;
     else if (link->state == MBM_LWIP_CONNECTING)
         status = MBM_PENDING;
@@ -381,7 +382,7 @@ static int16_t lwip_read(void *context, uint8_t *bytes, uint16_t capacity)
     int16_t count = 0;
 
     MBM_LWIP_TAKE(link);
-    if (is_lost(link)) {
+    if (notice_loss(link)) {
         count = -1;
     } else if (link->received != NULL && !(link->flags & MBM_LWIP_IS_NEW)) {
         count = (int16_t)take_bytes(link, bytes, capacity < MOST ? capacity : MOST);

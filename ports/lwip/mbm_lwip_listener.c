@@ -39,8 +39,9 @@ static mbm_lwip *close_oldest_idle(mbm_lwip_listener *listener)
     return oldest;
 }
 
-/* Returns a place whose connection has ended. What it has sent was read. */
-static mbm_lwip *ended(const mbm_lwip_listener *listener)
+/* Returns a place whose connection was lost, or ends one that its peer has closed. What the peer
+ * has sent was read. */
+static mbm_lwip *find_ended(const mbm_lwip_listener *listener)
 {
     uint16_t i;
 
@@ -69,7 +70,7 @@ static mbm_lwip *find_place(mbm_lwip_listener *listener)
         if (listener->places[i].state == MBM_LWIP_FREE)
             return &listener->places[i];
     }
-    place = ended(listener);
+    place = find_ended(listener);
     return place != NULL ? place : close_oldest_idle(listener);
 }
 
