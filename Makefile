@@ -31,8 +31,9 @@ PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
 LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
 LWIP_SOCKETS := over_lwip/mbm_tcp over_lwip/mbm_tcp_listener lwip/mbm_lwip_sockets lwip/serve_sockets lwip/client_sockets
-# Those with a wire in memory. The others have lwIP's own thread.
-LWIP_WIRE_TESTS := $(filter-out test_lwip_task test_lwip_sockets test_porttest_lwip,$(LWIP_TESTS))
+# Those with lwIP's own thread, and a relay to the machine. The others have a wire in memory.
+LWIP_RELAY_TESTS := $(filter test_lwip_task test_lwip_sockets test_porttest_lwip,$(LWIP_TESTS))
+LWIP_WIRE_TESTS := $(filter-out $(LWIP_RELAY_TESTS),$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PICO_TESTS := $(filter test_pico test_porttest_pico,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
@@ -317,6 +318,7 @@ $(BUILD)/$(1)/test_wiznet: INCLUDES += -Ic-tests/wiznet -Iports/wiznet
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
+$(LWIP_RELAY_TESTS:%=$(BUILD)/$(1)/%): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,lwip_wire lwip_pair)
 $(LWIP_WIRE_TESTS:%=$(BUILD)/$(1)/%): LIBS += -Wl$(comma)--wrap=tcp_write$(comma)--wrap=tcp_new_ip_type
 $(BUILD)/$(1)/test_lwip_examples: $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve)
@@ -325,11 +327,10 @@ $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve): INCLUDES += -Dmain=example_$$
 $(BUILD)/$(1)/over_lwip/%.o: ports/linux/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
-$(BUILD)/$(1)/test_lwip_sockets: $(LWIP_SOCKETS:%=$(BUILD)/$(1)/%.o) $(BUILD)/$(1)/lwip/lwip_relay.o
-# Each by its name: what the program has, Linux's objects would inherit.
+$(BUILD)/$(1)/test_lwip_sockets: $(LWIP_SOCKETS:%=$(BUILD)/$(1)/%.o)
+# Set for each object: what is set for the program holds for Linux's objects too.
 $(patsubst %,$(BUILD)/$(1)/%.o,test_lwip_sockets $(LWIP_SOCKETS)): INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
 $(BUILD)/$(1)/test_lwip_sockets: WITHOUT = $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/linux/*.c)) $(BUILD)/$(1)/support/tcp_waiting.o
-$(patsubst %,$(BUILD)/$(1)/test_%,lwip_task porttest_lwip): $(BUILD)/$(1)/lwip/lwip_relay.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/freertos
