@@ -18,9 +18,8 @@ static void changed(void *context, uint8_t event, uint8_t status)
 {
     (void)context;
     (void)status;
-    board_print(event == MBM_LINK_EVENT_CONNECTED ? "connected\n" : mbm_lwip_text(device.error));
-    if (event != MBM_LINK_EVENT_CONNECTED)
-        board_print("\n");
+    board_print(event == MBM_LINK_EVENT_CONNECTED ? "connected" : mbm_lwip_text(device.error));
+    board_print("\n");
 }
 
 static void has_read(void *context, mbm_clientRequest *ended)
