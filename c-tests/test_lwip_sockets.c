@@ -55,12 +55,10 @@ typedef struct reader {
 static void *write_and_read(void *of)
 {
     reader *r = of;
-    modbus_t *client = modbus_new_tcp("127.0.0.1", to_board);
+    modbus_t *client = tcp_clientOf(to_board, 1);
     uint16_t words[SERVED];
     unsigned i;
 
-    modbus_set_slave(client, 1);
-    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
     if (modbus_connect(client) == 0)
         for (i = 0; i < REQUESTS; i++)
             r->right += modbus_write_register(client, (int)r->address, (uint16_t)i) == 1 &&
@@ -74,13 +72,11 @@ static void *write_and_read(void *of)
 /* Whether libmodbus reads a register of the server. */
 static int reads_board(void)
 {
-    modbus_t *client = modbus_new_tcp("127.0.0.1", to_board);
+    modbus_t *client = tcp_clientOf(to_board, 1);
     uint16_t words[SERVED];
-    int done;
+    const int done =
+        modbus_connect(client) == 0 && modbus_read_registers(client, 0, SERVED, words) == SERVED;
 
-    modbus_set_slave(client, 1);
-    modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
-    done = modbus_connect(client) == 0 && modbus_read_registers(client, 0, SERVED, words) == SERVED;
     modbus_close(client);
     modbus_free(client);
     return done;
@@ -109,11 +105,9 @@ TEST(a_server_serves_on_after_resets)
     unsigned i;
 
     for (i = 0; i < RESETS; i++) {
-        modbus_t *client = modbus_new_tcp("127.0.0.1", to_board);
+        modbus_t *client = tcp_clientOf(to_board, 1);
         uint16_t word;
 
-        modbus_set_slave(client, 1);
-        modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0);
         assert_int_equal(modbus_connect(client), 0);
         assert_int_equal(modbus_read_registers(client, 0, 1, &word), 1);
         relay_reset();

@@ -33,8 +33,8 @@ static void sleep_until(sys_sem_t *news, uint32_t us)
 /* --- the server's task */
 
 static uint16_t words[REGISTERS];
-static mbm_registerTable holding = {.words = words, .size = REGISTERS};
-static mbm_unit unit = {.id = 1};
+static mbm_registerTable holding;
+static mbm_unit unit;
 static mbm_lwip_listener listener;
 static mbm_lwip places[PLACES];
 static mbm_server servers[PLACES];
@@ -258,11 +258,8 @@ static uint16_t to_server(void)
 
 static modbus_t *libmodbus_connect(void)
 {
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", to_server());
+    modbus_t *peer = tcp_clientOf(to_server(), 1);
 
-    assert_non_null(peer);
-    modbus_set_slave(peer, 1);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
     assert_int_equal(modbus_connect(peer), 0);
     return peer;
 }
@@ -360,7 +357,7 @@ static void close_in_thread(void *context)
 
 TEST(a_server_may_live_in_lwips_thread_alone)
 {
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", relay_toLwip(503));
+    modbus_t *peer = tcp_clientOf(relay_toLwip(503), 1);
     uint16_t got[REGISTERS];
     sys_sem_t done;
     int i;
@@ -368,8 +365,6 @@ TEST(a_server_may_live_in_lwips_thread_alone)
     assert_int_equal(sys_sem_new(&done, 0), ERR_OK);
     assert_int_equal(tcpip_callback(listen_in_thread, &done), ERR_OK);
     sys_arch_sem_wait(&done, 0);
-    modbus_set_slave(peer, 1);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
     assert_int_equal(modbus_connect(peer), 0);
     for (i = 0; i < 500; i++) {
         assert_int_equal(modbus_read_registers(peer, 0, REGISTERS, got), REGISTERS);

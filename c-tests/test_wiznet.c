@@ -1,5 +1,5 @@
 /* The port over the sockets of a WIZnet chip, client and server, over a W5500 that is played:
- * libmodbus at the far end, and a fault at each command to the the_chip. */
+ * libmodbus at the far end, and a fault at each command to the chip. */
 #include "await.h"
 #include "chip_model.h"
 #include "mbm_wiznet.h"
@@ -97,12 +97,10 @@ typedef struct reader {
 static void *read_many(void *of)
 {
     reader *r = of;
-    modbus_t *peer = modbus_new_tcp("127.0.0.1", chip_port());
+    modbus_t *peer = tcp_clientOf(chip_port(), 1);
     uint16_t read[REGISTERS];
     int i;
 
-    modbus_set_slave(peer, 1);
-    modbus_set_response_timeout(peer, PATIENCE_MS / 1000, 0);
     if (modbus_connect(peer) == 0)
         for (i = 0; i < r->reads; i++)
             r->right += modbus_read_registers(peer, 0, REGISTERS, read) == REGISTERS &&

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "tcp_server.h"
+#include "await.h"
 #include "server.h"
 
 #include <arpa/inet.h>
@@ -118,4 +119,16 @@ void tcp_server_stop(tcp_server *s)
     close(s->listener);
     close(s->stop[0]);
     close(s->stop[1]);
+}
+
+modbus_t *tcp_clientOf(uint16_t port, int unit)
+{
+    modbus_t *client = modbus_new_tcp("127.0.0.1", port);
+
+    if (!client || modbus_set_slave(client, unit) ||
+        modbus_set_response_timeout(client, PATIENCE_MS / 1000, 0)) {
+        perror("libmodbus client");
+        abort();
+    }
+    return client;
 }

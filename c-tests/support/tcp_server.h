@@ -20,6 +20,10 @@ typedef struct tcp_server {
 void tcp_server_start(tcp_server *s);
 void tcp_server_stop(tcp_server *s);
 
+/* Makes a libmodbus client for requests to a unit on a port of this machine. It is not connected
+ * yet, and waits long for its responses. */
+modbus_t *tcp_clientOf(uint16_t port, int unit);
+
 /* tcp_listenOnFree makes a socket that listens on a free port of this machine; tcp_connectTo makes
  * one that is connected to such a port. */
 int tcp_listenOnFree(uint16_t *port);
