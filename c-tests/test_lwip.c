@@ -176,15 +176,10 @@ TEST(small_segments_take_a_bounded_number_of_pbufs)
 /* More than windows and buffers of both ends hold. */
 TEST(responses_to_a_peer_that_reads_late_are_all_sent)
 {
-    uint16_t i, count = 0;
+    uint16_t count;
 
     peer_connect(&peers[0]);
-    peers[0].isDeaf = 1;
-    for (i = 0; i < 3000 && !(places[0].flags & MBM_LWIP_WAITS); i++) {
-        if (peer_canAsk(&peers[0]))
-            peer_ask(&peers[0], count++, 125);
-        wire_pass(10, serve);
-    }
+    count = peer_askDeaf(&peers[0], serve);
     wire_pass(5000, serve);
     assert_true(places[0].flags & MBM_LWIP_WAITS);
     assert_true(peers[0].count < count * 259u);
@@ -196,16 +191,9 @@ TEST(responses_to_a_peer_that_reads_late_are_all_sent)
 
 TEST(a_peer_that_never_reads_is_given_up_and_harms_no_other)
 {
-    uint16_t i;
-
     peer_connect(&peers[0]);
-    peers[0].isDeaf = 1;
     client_connect();
-    for (i = 0; i < 3000 && !(places[0].flags & MBM_LWIP_WAITS); i++) {
-        if (peer_canAsk(&peers[0]))
-            peer_ask(&peers[0], i, 125);
-        wire_pass(10, serve);
-    }
+    (void)peer_askDeaf(&peers[0], serve);
     client_reads();
     assert_true(mbm_lwip_isInUse(&places[0]));
     wire_pass(MBM_LWIP_UNACKNOWLEDGED_MS + 10000, serve);

@@ -21,6 +21,7 @@ extern uint32_t ends; /* connections whose end the server has seen */
 void serve(void);
 /* Resets all its connections, as if lwIP did. */
 void serve_reset(void);
+int places_inUse(void);
 
 /* --- the client */
 
@@ -57,9 +58,12 @@ extern peer peers[PLACES + 2];
 void peer_connect(peer *one);
 /* Sends bytes at once, in one segment. */
 void peer_send(peer *one, const void *bytes, uint16_t length);
-/* Sends the request number `number`, a read of registers from 0 on. */
 int peer_canAsk(const peer *one); /* lwIP takes a request now */
+/* Sends the request number `number`, a read of registers from 0 on. */
 void peer_ask(peer *one, uint16_t number, uint8_t quantity);
+/* Asks for all registers and reads nothing, until the first place has a response that lwIP does not
+ * take. A round is 10 ms, with `each` of wire_pass. Returns how many it has sent. */
+uint16_t peer_askDeaf(peer *one, void (*each)(void));
 /* Fails if other than these responses to peer_ask have come, from `first` on. */
 void peer_expects(const peer *one, uint16_t first, uint16_t count, uint8_t quantity);
 void peer_close(peer *one);
