@@ -25,6 +25,9 @@ pub const LONGEST: u32 = 1 << 31;
 /// bits at 9600 baud.
 pub const DEFAULT_SILENCE: u32 = 4_000;
 
+/// The bits of a character with a parity or a second stop bit, the most that a standard line has.
+pub(crate) const MOST_BITS: u8 = 11;
+
 /// The length of a character in microseconds while the baud rate is unknown: 11 bits at 9600
 /// baud.
 pub const DEFAULT_CHARACTER: u16 = 1_146;
@@ -116,7 +119,13 @@ pub const fn timeout(milliseconds: u32) -> Option<u32> {
 /// assert_eq!(mbm::time::character(9600), 1146);
 /// ```
 pub const fn character(baud: u32) -> u16 {
-    let time = match 11_000_000u32.checked_div(baud) {
+    character_of(MOST_BITS, baud)
+}
+
+/// As [`character`], of this number of bits, the start and stop bits included.
+#[inline(always)]
+pub(crate) const fn character_of(bits: u8, baud: u32) -> u16 {
+    let time = match (bits as u32 * 1_000_000).checked_div(baud) {
         Some(time) => time,
         None => return DEFAULT_CHARACTER,
     };

@@ -1,8 +1,9 @@
 //! A port over the traits of the crate embedded-io, for UARTs and sockets of a HAL.
 
-use super::transmission::{Transmission, MOST_BITS};
+use super::transmission::Transmission;
 use super::Port;
 use crate::error::Error;
+use crate::time::MOST_BITS;
 use ::embedded_io::{Read, ReadReady, Write, WriteReady};
 
 /// A [`Port`] over a device that implements [`Read`], [`ReadReady`], [`Write`] and

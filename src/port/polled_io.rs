@@ -1,8 +1,9 @@
 //! A port over the traits of embedded-io-async, whose futures it polls once.
 
-use super::transmission::{Transmission, MOST_BITS};
+use super::transmission::Transmission;
 use super::Port;
 use crate::error::Error;
+use crate::time::MOST_BITS;
 use core::future::Future;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};

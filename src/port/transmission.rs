@@ -1,9 +1,6 @@
 //! When the last byte has left a UART that does not say so.
 
-use crate::time::{elapsed, Micros, Micros16, DEFAULT_CHARACTER};
-
-/// The bits of a character with a parity or a second stop bit, the most that a standard line has.
-pub(super) const MOST_BITS: u8 = 11;
+use crate::time::{character_of, elapsed, Micros, Micros16};
 
 /// The time that accepted bytes take to leave a UART, computed from its baud rate.
 #[derive(Clone, Debug)]
@@ -25,13 +22,8 @@ impl Transmission {
 
     /// Of a character with this number of bits, the start and stop bits included.
     pub fn new(baud: u32, bits: u8) -> Self {
-        let time = (u32::from(bits) * 1_000_000).checked_div(baud);
-        let character = match time {
-            Some(time) => Micros16::try_from(time + 1).unwrap_or(Micros16::MAX),
-            None => DEFAULT_CHARACTER,
-        };
         Transmission {
-            character,
+            character: character_of(bits, baud),
             ..Transmission::UNKNOWN
         }
     }
