@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::uart::{master, read, write, Bench, Wire};
+use common::uart::{check_sending_time, master, read, write, Bench, Wire};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use mbm::error::{Error, Status};
 use mbm::port::{EmbeddedIo, Port};
@@ -191,39 +191,10 @@ fn the_clock_may_wrap_at_any_time_of_a_request() {
     }
 }
 
-/// The microseconds after which a frame of 256 bytes, taken at once, counts as sent.
-fn sending_time(mut port: impl Port, wire: &Rc<RefCell<Wire>>) -> u32 {
-    let start = wire.borrow().now;
-    port.pre_transmission();
-    assert_eq!(port.write(&[0; 256]), Ok(256));
-    while !port.flush() {
-        wire.borrow_mut().now += 1;
-    }
-    wire.borrow().now.wrapping_sub(start)
-}
-
 #[test]
 fn the_time_of_a_frame_is_that_of_its_bits() {
-    for (bits, baud, least) in [
-        (10, 115_200, 22_222),
-        (11, 115_200, 24_444),
-        (10, 9600, 266_667),
-        (10, 460_800, 5_556),
-    ] {
-        let bench = Bench::new();
-        bench.wire.borrow_mut().accepts = 256;
-        let uart = Uart(bench.wire.clone());
-        let port = EmbeddedIo::serial(uart, clock(&bench.wire)).with_driver_and_bits(
-            driver(&bench.wire),
-            baud,
-            bits,
-        );
-        let took = sending_time(port, &bench.wire);
-        // A microsecond of rounding for each character, and one character of reserve.
-        let most = least + 257 + u32::from(bits) * 1_000_000 / baud + 1;
-        assert!(
-            (least..=most).contains(&took),
-            "{bits} bits at {baud}: {took}"
-        );
-    }
+    check_sending_time(|bench, baud, bits| {
+        let (uart, clock) = (Uart(bench.wire.clone()), clock(&bench.wire));
+        EmbeddedIo::serial(uart, clock).with_driver_and_bits(driver(&bench.wire), baud, bits)
+    });
 }

@@ -197,3 +197,34 @@ pub fn write(bench: &mut Bench, port: impl Port) -> u32 {
     assert_eq!(result, Ok(()), "{accepts}");
     times[1] - times[0]
 }
+
+/// Checks when a port counts a frame of 256 bytes as sent: after the time of its bits, and soon. `port` makes
+/// a port on the bench's UART for a baud rate and a number of bits in a character.
+pub fn check_sending_time<P: Port>(port: impl Fn(&Bench, u32, u8) -> P) {
+    for (bits, baud, least) in [
+        (10, 115_200, 22_222),
+        (11, 115_200, 24_444),
+        (10, 9600, 266_667),
+        (10, 460_800, 5_556),
+    ] {
+        let bench = Bench::new();
+        let took = sending_time(port(&bench, baud, bits), &bench.wire);
+        // A microsecond of rounding for each character, and one character of reserve.
+        let most = least + 257 + u32::from(bits) * 1_000_000 / baud + 1;
+        assert!(
+            (least..=most).contains(&took),
+            "{bits} bits at {baud}: {took}"
+        );
+    }
+}
+
+/// The microseconds after which a frame of 256 bytes, which the UART accepts at once, counts as sent.
+fn sending_time(mut port: impl Port, wire: &Rc<RefCell<Wire>>) -> u32 {
+    let start = wire.borrow().now;
+    port.pre_transmission();
+    assert_eq!(port.write(&[0; 256]), Ok(256));
+    while !port.flush() {
+        wire.borrow_mut().now += 1;
+    }
+    wire.borrow().now.wrapping_sub(start)
+}
