@@ -90,6 +90,24 @@ impl Order {
     }
 }
 
+/// The byte at the index `place` of words, the high byte of each word first; `None` past the end.
+pub(super) fn byte_of(words: &[u16], place: usize) -> Option<u8> {
+    let [high, low] = words.get(place / 2)?.to_be_bytes();
+    Some(if place.is_multiple_of(2) { high } else { low })
+}
+
+/// Sets the byte that [`byte_of`] returns; does nothing past the end.
+pub(super) fn set_byte_of(words: &mut [u16], place: usize, value: u8) {
+    if let Some(word) = words.get_mut(place / 2) {
+        let [high, low] = word.to_be_bytes();
+        *word = u16::from_be_bytes(if place.is_multiple_of(2) {
+            [value, low]
+        } else {
+            [high, value]
+        });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

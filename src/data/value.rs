@@ -1,6 +1,6 @@
 //! Numbers of one, two or four registers. Floats are copied as bits, without arithmetic.
 
-use super::order::Order;
+use super::order::{byte_of, set_byte_of, Order};
 use crate::error::Error;
 
 /// A number of one, two or four registers.
@@ -55,13 +55,7 @@ pub trait Value: Copy {
         let mut bytes = Self::Bytes::default();
         let mask = order.mask(bytes.as_ref().len());
         for (place, byte) in bytes.as_mut().iter_mut().enumerate() {
-            let place = place ^ mask;
-            let word = words.get(place / 2).ok_or(Error::IllegalDataAddress)?;
-            *byte = if place.is_multiple_of(2) {
-                (word >> 8) as u8
-            } else {
-                *word as u8
-            };
+            *byte = byte_of(words, place ^ mask).ok_or(Error::IllegalDataAddress)?;
         }
         Ok(Self::from_bytes(bytes))
     }
@@ -82,15 +76,12 @@ pub trait Value: Copy {
     fn to_words(self, words: &mut [u16], order: Order) -> Result<(), Error> {
         let bytes = self.to_bytes();
         let bytes = bytes.as_ref();
+        if words.len() < bytes.len().div_ceil(2) {
+            return Err(Error::IllegalDataAddress);
+        }
         let mask = order.mask(bytes.len());
-        let words = words.get_mut(..bytes.len().div_ceil(2));
-        for (place, word) in words
-            .ok_or(Error::IllegalDataAddress)?
-            .iter_mut()
-            .enumerate()
-        {
-            let byte = |place: usize| bytes.get(place ^ mask).copied().unwrap_or(0);
-            *word = u16::from_be_bytes([byte(2 * place), byte(2 * place + 1)]);
+        for (place, byte) in bytes.iter().enumerate() {
+            set_byte_of(words, place ^ mask, *byte);
         }
         Ok(())
     }

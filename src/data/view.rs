@@ -3,7 +3,7 @@
 //!
 //! An access beyond the registers returns [`Error::IllegalDataAddress`]; nothing panics.
 
-use super::order::Order;
+use super::order::{byte_of, set_byte_of, Order};
 use super::value::Value;
 use crate::error::Error;
 
@@ -75,8 +75,7 @@ impl RegisterBytes for &[u16] {
     }
 
     fn byte(&self, place: usize) -> Option<u8> {
-        let [high, low] = self.get(place / 2)?.to_be_bytes();
-        Some(if place.is_multiple_of(2) { high } else { low })
+        byte_of(self, place)
     }
 }
 
@@ -104,20 +103,13 @@ impl RegisterBytes for &mut [u16] {
     }
 
     fn byte(&self, place: usize) -> Option<u8> {
-        (&**self).byte(place)
+        byte_of(self, place)
     }
 }
 
 impl RegisterBytesMut for &mut [u16] {
     fn set_byte(&mut self, place: usize, value: u8) {
-        if let Some(word) = self.get_mut(place / 2) {
-            let [high, low] = word.to_be_bytes();
-            *word = u16::from_be_bytes(if place.is_multiple_of(2) {
-                [value, low]
-            } else {
-                [high, value]
-            });
-        }
+        set_byte_of(self, place, value);
     }
 }
 
