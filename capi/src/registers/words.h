@@ -144,9 +144,7 @@ static inline uint8_t mbm_words_setUint32(uint16_t *words, uint8_t order, uint32
 /** As mbm_words_setUint32, with a sign, in two's complement. */
 static inline uint8_t mbm_words_setInt32(uint16_t *words, uint8_t order, int32_t number)
 {
-    const mbm_registers view = {words, 0, 2, MBM_REGISTERS_INTO_WORDS, MBM_ORDER_ABCD};
-
-    return mbm_registers_setUint32(&view, 0, order, (uint32_t)number);
+    return mbm_words_setUint32(words, order, (uint32_t)number);
 }
 
 /** As mbm_words_setUint32, for a number of one word. */
@@ -160,9 +158,7 @@ static inline uint8_t mbm_words_setUint16(uint16_t *words, uint8_t order, uint16
 /** As mbm_words_setUint32, for a number of one word with a sign. */
 static inline uint8_t mbm_words_setInt16(uint16_t *words, uint8_t order, int16_t number)
 {
-    const mbm_registers view = {words, 0, 1, MBM_REGISTERS_INTO_WORDS, MBM_ORDER_ABCD};
-
-    return mbm_registers_setUint16(&view, 0, order, (uint16_t)number);
+    return mbm_words_setUint16(words, order, (uint16_t)number);
 }
 
 /** As mbm_words_setUint32, for a float, an IEEE 754 binary32. Its bits are copied. */
@@ -192,9 +188,7 @@ static inline uint8_t mbm_words_setDouble(uint16_t *words, uint8_t order, double
 /** As mbm_words_setUint64, with a sign, in two's complement. */
 static inline uint8_t mbm_words_setInt64(uint16_t *words, uint8_t order, int64_t number)
 {
-    const mbm_registers view = {words, 0, 4, MBM_REGISTERS_INTO_WORDS, MBM_ORDER_ABCD};
-
-    return mbm_registers_setUint64(&view, 0, order, (const uint64_t *)&number);
+    return mbm_words_setUint64(words, order, (uint64_t)number);
 }
 
 /**
