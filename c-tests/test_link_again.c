@@ -628,13 +628,6 @@ TEST(a_request_that_was_answered_before_it_was_sent_is_not_sent)
     works_over_the_new_link(MBM_FRAMING_TCP);
 }
 
-/* A program that does not ask for the link's events, and polls less often than attempts are due. */
-static void nobody_hears_of_attempts_without_wait(void)
-{
-    OK(mbm_link_setCallback(&kept, NULL, NULL));
-    OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_NONE, 0, 0));
-}
-
 FRAMING_TEST(requests_end_if_attempts_that_fail_follow_each_other_without_a_wait)
 {
     static const uint8_t failing[] = {MBM_LINK_LOST, MBM_PENDING};
@@ -644,7 +637,9 @@ FRAMING_TEST(requests_end_if_attempts_that_fail_follow_each_other_without_a_wait
             begin(framing);
         else
             begin_up(framing);
-        nobody_hears_of_attempts_without_wait();
+        /* The program does not ask for events, and an attempt is due in each poll. */
+        OK(mbm_link_setCallback(&kept, NULL, NULL));
+        OK(mbm_link_setBackoff(&kept, MBM_BACKOFF_NONE, 0, 0));
         connects_with = failing[i / 2];
         m.is_lost = 1;
         for (unsigned round = 0; round < 10; round++) {

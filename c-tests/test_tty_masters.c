@@ -130,8 +130,8 @@ TEST(two_masters_with_one_port_struct_each_end_in_time)
     both_time_out();
 }
 
-/* Moves by at most a millisecond while nobody looks: a master whose process does not run finds the
- * noise in time. */
+/* A clock that moves by at most a millisecond between two looks at it. So a master whose process
+ * did not run for a while still finds the noise before its timeout. */
 static uint32_t patient_micros(void *context)
 {
     static uint32_t before, shown;
@@ -142,7 +142,7 @@ static uint32_t patient_micros(void *context)
     return shown;
 }
 
-/* Bytes that are no reply lie there before the request. */
+/* Bytes that are no reply have arrived before the request. */
 TEST(noise_does_not_keep_a_request_from_ending)
 {
     mbm_port port = open_tty();

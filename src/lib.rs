@@ -298,8 +298,8 @@ pub mod engine;
 #[doc = include_str!("../README.md")]
 struct Guide;
 
-/// The example of a call of a client or master, after the lines that make it: what is before the call, the
-/// call, what is after it. The documentation shows these three alone.
+/// The example of a call of a client or master. The documentation hides the lines that make the client or
+/// master. It shows what is before the call, the call, and what is after it.
 macro_rules! call_example {
     ([] $made:literal, $before:literal, $call:literal, $after:literal) => {
         concat!(

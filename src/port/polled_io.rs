@@ -118,8 +118,8 @@ impl<D, C> PolledIo<D, C> {
     }
 
     /// As [`with_driver`](Self::with_driver), on a line whose characters have this number of bits, the start
-    /// and stop bits included: 10 without a parity and with one stop bit. Then the driver is not on for 25
-    /// characters too long after a frame of 256 bytes. A number that is too small may cut off the end.
+    /// and stop bits included: 10 without a parity and with one stop bit. With 11 bits the driver would
+    /// stay on for 25 characters too long after a frame of 256 bytes. A number that is too small may cut off the end.
     ///
     /// ```
     /// use embedded_io_async::{Read, Write};

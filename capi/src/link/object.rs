@@ -304,9 +304,9 @@ pub(super) unsafe fn release(object: *mut client::Object, request: Option<&Reque
     ((*(*link).kind.transport).release)(object, request);
 }
 
-/// Counts an event. Returns the request whose `done` reports the event, also if the program does
-/// not want to know it: the poll goes on after it and ends requests, which the event of an attempt
-/// in every poll would hold back otherwise.
+/// Counts an event. Returns the request whose `done` reports it. A link without a callback returns
+/// that request too, because the poll goes on after a request that ended. Without it, an attempt
+/// that fails in each poll would keep all requests from ending.
 unsafe fn note(link: *mut Object, event: LinkEvent, status: Status) -> Option<RequestPtr> {
     count(link, |counters| match event {
         LinkEvent::Connected => &mut counters.connected,
