@@ -18,13 +18,7 @@ def check(kit, boards) -> None:
     for board in boards:
         archive, folder = {"pico": "cortex-m0plus", "pico2": "cortex-m33"}[board], kit.work / board
         kit.run(kit.log, [kit.root / "scripts/build/archive", archive])
-        environment = {**os.environ, "PICO_SDK_PATH": str(kit.tree)}
-        said = kit.run(kit.log, ["cmake", "-GNinja", "-S", kit.root / "examples/pico", "-B", folder, f"-DPICO_BOARD={board}",
-                                 "-DPICO_NO_PICOTOOL=1", f"-DMBM_LIBRARY={kit.root}/build/archives/{archive}/libmbm.a"],
-                       env=environment)
-        said += kit.run(kit.log, ["ninja", "-C", folder], env=environment)
-        if OURS.search(said):
-            kit.fail("a file of mbm compiles with a warning:\n" + "\n".join(line for line in said.splitlines() if OURS.search(line)))
+        build(kit, "examples/pico", folder, archive, f"-DPICO_BOARD={board}")
         for example, line in EXAMPLES:
             size = kit.run(kit.log, ["arm-none-eabi-size", folder / f"{example}.elf"]).splitlines()[1].split()
             print(f"real: pico {version}: {board}: {example} linked, {int(size[0]) + int(size[1])} bytes of flash, "
@@ -32,15 +26,21 @@ def check(kit, boards) -> None:
             if board == "pico":
                 print(kit.run(kit.log, [kit.root / "firmware-tests/rp2040/check", line, folder / f"{example}.elf"]), end="")
         if board == "pico":
-            port_test(kit, environment)
+            port_test(kit)
 
 
-def port_test(kit, environment) -> None:
-    """Runs the test kit for ports over the UART, and prints its report."""
-    folder = kit.work / "porttest"
-    said = kit.run(kit.log, ["cmake", "-GNinja", "-S", kit.root / "firmware-tests/rp2040", "-B", folder, "-DPICO_NO_PICOTOOL=1",
-                             f"-DMBM_LIBRARY={kit.root}/build/archives/cortex-m0plus/libmbm.a"], env=environment)
+def build(kit, project, folder, archive, *options) -> None:
+    """Builds a project with CMake by pico-sdk. Fails if a compiler warns of a file of mbm's."""
+    environment = {**os.environ, "PICO_SDK_PATH": str(kit.tree)}
+    said = kit.run(kit.log, ["cmake", "-GNinja", "-S", kit.root / project, "-B", folder, "-DPICO_NO_PICOTOOL=1",
+                             f"-DMBM_LIBRARY={kit.root}/build/archives/{archive}/libmbm.a", *options], env=environment)
     said += kit.run(kit.log, ["ninja", "-C", folder], env=environment)
     if OURS.search(said):
-        kit.fail("a file of mbm compiles with a warning")
+        kit.fail("a file of mbm compiles with a warning:\n" + "\n".join(line for line in said.splitlines() if OURS.search(line)))
+
+
+def port_test(kit) -> None:
+    """Runs the test kit for ports over the UART, and prints its report."""
+    folder = kit.work / "porttest"
+    build(kit, "firmware-tests/rp2040", folder, "cortex-m0plus")
     print(kit.run(kit.log, [kit.root / "firmware-tests/rp2040/check", "porttest", folder / "porttest.elf"]), end="")
