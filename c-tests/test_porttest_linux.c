@@ -2,40 +2,27 @@
  * frames of Modbus TCP alone, and the kit sends bytes. None has a baud rate here, so no time on a
  * wire is judged. */
 #define _GNU_SOURCE
-#include "mbm_porttest.h"
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
 #include "await.h"
+#include "clock.h"
+#include "porttest.h"
 #include "pty.h"
 #include "test.h"
 
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 static mbm_portTest test;
 static mbm_port near_port, far_port;
-
-static void say(void *context, mbm_portFinding kind, const char *sentence)
-{
-    print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
-}
-
-static uint32_t monotonic(void *context)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC_RAW, &now);
-    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
-}
 
 static void begin(void)
 {
     memset(&test, 0, sizeof test);
     test.port = &near_port;
     test.other = &far_port;
-    test.reference = monotonic;
-    test.say = say;
+    test.reference = raw_micros;
+    test.say = porttest_say;
 }
 
 fixture each_test = {begin, NULL};

@@ -1,31 +1,17 @@
 /* The port for lwIP's raw API in the test kit for ports, in a task beside lwIP's own thread: a
  * connection and its far end. There is no baud rate, so no time on a wire is judged. */
 #include "await.h"
+#include "clock.h"
 #include "lwip_relay.h"
 #include "mbm_lwip.h"
-#include "mbm_porttest.h"
+#include "porttest.h"
 #include "test.h"
-
-#include <time.h>
 
 enum { PORT = 502 };
 
 static mbm_lwip_listener listener;
 static mbm_lwip near_end, far_end;
 static mbm_port near_port, far_port;
-
-static void say(void *context, mbm_portFinding kind, const char *sentence)
-{
-    print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
-}
-
-static uint32_t monotonic(void *context)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC_RAW, &now);
-    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
-}
 
 static void yield(void *context)
 {
@@ -56,10 +42,10 @@ TEST(the_port_passes_the_test_kit)
     far_port = mbm_lwip_port(&far_end);
     test.port = &near_port;
     test.other = &far_port;
-    test.reference = monotonic;
+    test.reference = raw_micros;
     test.begin = begin;
     test.yield = yield;
-    test.say = say;
+    test.say = porttest_say;
     test.holds = 256;
     assert_int_equal(mbm_portTest_run(&test), 0);
     assert_int_equal(test.wrong, 0);

@@ -1,9 +1,8 @@
 /* The port for the Raspberry Pi Pico in the test kit for ports, on a model of its UART, whose TX is
  * wired to RX, and over USB, with a host at the other end. */
-#include "mbm_porttest.h"
-
 #include "mbm_pico.h"
 #include "pico_model.h"
+#include "porttest.h"
 #include "test.h"
 
 enum { DRIVER = 6, BAUD = 9600, BITS = 11, STEP = 2 /* microseconds */ };
@@ -14,12 +13,6 @@ static mbm_picoUart line;
 static mbm_picoUsb usb;
 static mbm_port port, host;
 static mbm_portTest test;
-
-static void say(void *context, mbm_portFinding kind, const char *sentence)
-{
-    (void)context;
-    print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
-}
 
 /* --- UART */
 
@@ -112,7 +105,7 @@ static void begin(void)
     line.driverPin = DRIVER;
     line.hasDriver = true;
     test.port = &port;
-    test.say = say;
+    test.say = porttest_say;
 }
 
 fixture each_test = {begin, NULL};

@@ -1,7 +1,6 @@
 /* The port for STM32 in the test kit for ports, on a chip that is played. TX is wired to RX. */
-#include "mbm_porttest.h"
-
 #include "machine.h"
+#include "porttest.h"
 #include "test.h"
 #include "uart.h"
 
@@ -47,11 +46,6 @@ static uint8_t begin_again(void *context)
     return mbm_stm32_open(&uart, &huart1, &port) != MBM_STM32_OK;
 }
 
-static void say(void *context, mbm_portFinding kind, const char *sentence)
-{
-    print_message("%s: %s\n", mbm_portFinding_name(kind), sentence);
-}
-
 static void passes(uint8_t byDma)
 {
     uart_start(byDma);
@@ -65,7 +59,7 @@ static void passes(uint8_t byDma)
     test.bits = 11;
     test.baud = 115200;
     test.holds = MBM_STM32_RECEIVE_BYTES - 1;
-    test.say = say;
+    test.say = porttest_say;
     test.lost = lost;
     test.driver = driver;
     test.begin = begin_again;
