@@ -277,15 +277,13 @@ TEST(a_line_that_waits_does_not_delay_another)
 
 TEST(a_connection_that_breaks_gives_up_its_request)
 {
-    const struct linger hard = {1, 0};
-
     for (unsigned i = 0; i < 40; i++) {
         static const uint8_t request[] = {0, 1, 0, 0, 0, 6, PEER_UNIT, 3, 0, 0, 0, 1};
         int fd = tcp_connectTo((uint16_t)port);
 
         assert_int_equal(write(fd, request, sizeof request), sizeof request);
         if (i % 2)
-            setsockopt(fd, SOL_SOCKET, SO_LINGER, &hard, sizeof hard);
+            (void)tcp_resetAtClose(fd);
         if (i % 3)
             usleep(1000);
         close(fd);

@@ -12,7 +12,6 @@
 #include <modbus.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <sys/socket.h>
 
 enum { PLACES = 4, REGISTERS = 100, PORT = 502, TO_LIBMODBUS = 1502, RESETS = 10 };
 
@@ -273,11 +272,7 @@ TEST(twenty_thousand_requests_of_libmodbus_and_ten_resets)
 
     for (i = 0; i < count; i++) {
         if (i % (count / RESETS) == count / RESETS / 2) {
-            const struct linger at_once = {1, 0};
-
-            assert_int_equal(setsockopt(modbus_get_socket(peer), SOL_SOCKET, SO_LINGER, &at_once,
-                                        sizeof at_once),
-                             0);
+            assert_int_equal(tcp_resetAtClose(modbus_get_socket(peer)), 0);
             modbus_close(peer);
             assert_int_equal(modbus_connect(peer), 0);
         }

@@ -224,14 +224,12 @@ TEST(a_stream_that_is_not_modbus_is_closed)
 
 TEST(a_connection_that_breaks_frees_its_place)
 {
-    const struct linger hard = {1, 0};
-
     for (unsigned i = 0; i < 50; i++) {
         int fd = tcp_connectTo((uint16_t)tcp.port);
 
         assert_int_equal(write(fd, "\0\1\0\0\0\6", i % 7), i % 7);
         if (i % 2)
-            setsockopt(fd, SOL_SOCKET, SO_LINGER, &hard, sizeof hard);
+            (void)tcp_resetAtClose(fd);
         close(fd);
         go_round();
     }

@@ -32,9 +32,7 @@ static uint16_t machine_port_of_all;
 
 static void reset_machine(relay *one)
 {
-    const struct linger at_once = {1, 0};
-
-    (void)setsockopt(one->fd, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    (void)tcp_resetAtClose(one->fd);
     /* Wakes the other thread, which closes it. */
     (void)shutdown(one->fd, SHUT_RD);
 }

@@ -64,6 +64,13 @@ int tcp_connectTo(uint16_t port)
     return fd;
 }
 
+int tcp_resetAtClose(int fd)
+{
+    const struct linger at_once = {1, 0};
+
+    return setsockopt(fd, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+}
+
 static void *serve(void *argument)
 {
     tcp_server *s = (tcp_server *)argument;

@@ -29,6 +29,9 @@ modbus_t *tcp_clientOf(uint16_t port, int unit);
 int tcp_listenOnFree(uint16_t *port);
 int tcp_connectTo(uint16_t port);
 
+/* Makes the close of a socket a reset. Returns 0, or -1 if the system refuses. */
+int tcp_resetAtClose(int fd);
+
 /* Makes a socket that reserves a free port for listeners with SO_REUSEADDR: no other
  * program gets it. */
 int tcp_reserve(uint16_t *port);

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "tcp_stream.h"
+#include "tcp_server.h"
 
 #include <string.h>
 #include <sys/socket.h>
@@ -15,9 +16,7 @@ void stream_let_go(stream *c)
 
 void stream_reset(stream *c)
 {
-    const struct linger at_once = {1, 0};
-
-    setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    (void)tcp_resetAtClose(c->fd);
     stream_let_go(c);
 }
 

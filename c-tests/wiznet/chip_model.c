@@ -80,12 +80,10 @@ uint16_t chip_port(void)
 
 static void end_connection(uint8_t number, int is_hard)
 {
-    const struct linger now = {1, 0};
-
     if (sockets[number].fd < 0)
         return;
     if (is_hard)
-        (void)setsockopt(sockets[number].fd, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+        (void)tcp_resetAtClose(sockets[number].fd);
     host_close(sockets[number].fd);
     sockets[number].fd = -1;
 }
