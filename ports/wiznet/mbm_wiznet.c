@@ -24,11 +24,16 @@ static uint16_t server_port(const mbm_wiznet *chip)
     return chip->port != 0 ? chip->port : MBM_WIZNET_PORT;
 }
 
+static uint8_t state_of(const mbm_wiznet *chip)
+{
+    return getSn_SR((uint32_t)chip->number);
+}
+
 /* The chip forgets the connection, with what was not acknowledged. ioLibrary waits for the chip's
  * answer to a command, and so for ever if there is no chip. */
 static void leave(mbm_wiznet *chip, int8_t error)
 {
-    if (getSn_SR((uint32_t)chip->number) != NO_CHIP)
+    if (state_of(chip) != NO_CHIP)
         (void)close(chip->number);
     chip->state = LOST;
     chip->error = error;
@@ -43,7 +48,7 @@ static int open_socket(mbm_wiznet *chip, uint16_t port, uint8_t mode)
 {
     int8_t opened = SOCKERR_SOCKINIT;
 
-    if (getSn_SR((uint32_t)chip->number) != NO_CHIP)
+    if (state_of(chip) != NO_CHIP)
         opened = socket(chip->number, Sn_MR_TCP, port, (uint8_t)(SF_TCP_NODELAY | mode));
     if (opened == (int8_t)chip->number)
         return 0;
@@ -77,7 +82,7 @@ static uint8_t progress(mbm_wiznet *chip)
 
     if (chip->state != CONNECTING && chip->state != CONNECTED)
         return MBM_LINK_LOST;
-    seen = getSn_SR((uint32_t)chip->number);
+    seen = state_of(chip);
     switch (seen) {
     case SOCK_ESTABLISHED: break;
     case SOCK_CLOSE_WAIT:
@@ -225,7 +230,7 @@ static int listen_again(mbm_wiznet *chip)
 
 static int look_for_client(mbm_wiznet *chip)
 {
-    switch (getSn_SR((uint32_t)chip->number)) {
+    switch (state_of(chip)) {
     case SOCK_ESTABLISHED:
     case SOCK_CLOSE_WAIT: enter_connected(chip); return 1;
     case SOCK_LISTEN:
@@ -265,7 +270,7 @@ int mbm_wiznet_serve(mbm_wiznet *chip)
     case LISTENING: return look_for_client(chip);
     case CONNECTED: return look_at_connection(chip);
     case CLOSING:
-        if (getSn_SR((uint32_t)chip->number) == SOCK_LAST_ACK)
+        if (state_of(chip) == SOCK_LAST_ACK)
             return 0;
         return listen_again(chip);
     default: return listen_again(chip);
