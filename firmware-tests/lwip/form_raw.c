@@ -42,7 +42,6 @@ void form_serve(void *none)
     for (i = 0; i < PLACES; i++) {
         places[i].ready = wake;
         places[i].context = listener.context;
-        places[i].isTask = 1;
     }
     while (mbm_lwip_listen(&listener, NULL, MBM_LWIP_PORT, places, PLACES) != MBM_OK)
         vTaskDelay(1000);

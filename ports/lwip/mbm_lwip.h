@@ -12,7 +12,8 @@
  *   tcpip_callback or sys_timeout, or by a task that holds the lock of the core. This is the
  *   default.
  * - Each call takes the lock of the core itself. Then clients and servers are polled by a task
- *   of yours, which must not hold the lock. Set `isTask` of each connection and listener.
+ *   of yours, which must not hold the lock. Set `isTask` of a client's connection and of a
+ *   listener. mbm_lwip_listen sets that of the places.
  *
  * Functions return a status of mbm.h: MBM_INVALID_ARGUMENT for NULL, and for `isTask` if lwIP is
  * compiled without the lock (LWIP_TCPIP_CORE_LOCKING).
