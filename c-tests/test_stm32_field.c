@@ -2,28 +2,14 @@
  * STM32 on a chip that is played. scripts/check/real_stm32.py runs these tests with ST's HAL. */
 #include "crc.h"
 #include "machine.h"
+#include "served_unit.h"
 #include "test.h"
-#include "uart.h"
 
-enum { UNIT = 17, RING = MBM_STM32_RECEIVE_BYTES };
-
-static uint16_t cells[125];
-static mbm_registerTable holding;
-static mbm_unit unit;
-static mbm_server server;
-static uint8_t frame[MBM_MAX_FRAME];
+enum { RING = MBM_STM32_RECEIVE_BYTES };
 
 static void start(uint8_t byDma)
 {
-    memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
-    holding = (mbm_registerTable){.words = cells, .base = 0, .size = COUNT(cells)};
-    unit.id = UNIT;
-    uart_start(byDma);
-    uart_open();
-    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_setBaudRate(&server, 115200));
+    served_unit_start(byDma, 0);
 }
 
 static void ask(uint8_t quantity)
@@ -34,16 +20,10 @@ static void ask(uint8_t quantity)
     machine_receive(request, sizeof request, 0);
 }
 
-/* Polls until so many more characters have left, at most for a second. */
+/* In a second at most. */
 static void serve(unsigned characters)
 {
-    unsigned end = m.sentCount + characters;
-
-    for (unsigned polls = 0; polls < 10000 && m.sentCount < end; polls++) {
-        machine_run(50);
-        mbm_server_poll(&server);
-    }
-    assert_int_equal(m.sentCount, end);
+    served_unit_sends(characters, 10000, 50);
 }
 
 static void answers(uint8_t quantity)

@@ -2,45 +2,20 @@
  * tests with ST's HAL. */
 #include "crc.h"
 #include "machine.h"
+#include "served_unit.h"
 #include "test.h"
-#include "uart.h"
-
-enum { UNIT = 17 };
-
-static uint16_t cells[10];
-static mbm_registerTable holding;
-static mbm_unit unit;
-static mbm_server server;
-static uint8_t frame[MBM_MAX_FRAME];
-
-static void start(uint8_t byDma)
-{
-    memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
-    holding = (mbm_registerTable){.words = cells, .base = 100, .size = 10};
-    unit.id = UNIT;
-    uart_start(byDma);
-    uart_open();
-    OK(mbm_unit_serveHoldingRegisters(&unit, &holding));
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_setBaudRate(&server, 115200));
-}
 
 TEST(a_server_answers_at_every_position_and_from_a_main_loop_that_is_late)
 {
     for (uint8_t byDma = 0; byDma < 2; byDma++) {
-        start(byDma);
+        served_unit_start(byDma, 100);
         for (unsigned round = 0; round < 200; round++) {
             uint8_t request[8] = {UNIT, 6, 0, 105, (uint8_t)(round >> 8), (uint8_t)round};
             unsigned sent = m.sentCount;
 
             seal(request, 6);
             machine_receive(request, 8, 0);
-            for (unsigned polls = 0; polls < 40 && m.sentCount < sent + 8; polls++) {
-                machine_run(round % 2 ? 100 : 3000);
-                mbm_server_poll(&server);
-            }
-            assert_int_equal(m.sentCount, sent + 8);
+            served_unit_sends(8, 40, round % 2 ? 100 : 3000);
             assert_memory_equal(m.sent + sent, request, 8);
             assert_int_equal(cells[5], round);
             machine_run(3000);
@@ -56,20 +31,15 @@ TEST(a_server_answers_a_request_that_follows_disturbed_characters)
     static const unsigned kinds[] = {FRAMING, NOISE, PARITY};
 
     for (uint8_t byDma = 0; byDma < 2; byDma++) {
-        start(byDma);
+        served_unit_start(byDma, 100);
         for (unsigned round = 0; round < 60; round++) {
             uint8_t request[8] = {UNIT, 6, 0, 105, 0, (uint8_t)round};
-            unsigned sent = m.sentCount;
 
             seal(request, 6);
             /* The master's driver goes on, and disturbs the line. */
             machine_receive_faulty(0, kinds[round % 3]);
             machine_receive(request, 8, 0);
-            for (unsigned polls = 0; polls < 20 && m.sentCount < sent + 8; polls++) {
-                machine_run(2500);
-                mbm_server_poll(&server);
-            }
-            assert_int_equal(m.sentCount, sent + 8);
+            served_unit_sends(8, 20, 2500);
             machine_run(5000);
             mbm_server_poll(&server);
         }

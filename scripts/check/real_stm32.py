@@ -170,8 +170,8 @@ def on_this_machine(kit, board: str) -> None:
                (host / "registers.c", ["-O1"]),
                (root / "c-tests/stm32/machine.c", ["-O1"]), (root / "c-tests/support/test.c", ["-O1"]),
                *((root / source, ["-O1", "-Wall", "-Wextra", "-Werror", *with_hal]) for source in
-                 (*(f"c-tests/{test}.c" for test in tests), "c-tests/stm32/uart.c", "ports/stm32/mbm_stm32.c",
-                  "ports/stm32/mbm_stm32_callbacks.c"))]
+                 (*(f"c-tests/{test}.c" for test in tests), "c-tests/stm32/uart.c", "c-tests/stm32/served_unit.c",
+                  "ports/stm32/mbm_stm32.c", "ports/stm32/mbm_stm32_callbacks.c"))]
     for source, options in sources:
         kit.run(kit.log, [*low, *options, "-c", source, "-o", work / (source.stem + ".o")])
     shared = [work / (source.stem + ".o") for source, _ in sources if source.stem not in tests]
