@@ -2,6 +2,16 @@
  * Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
+static uint32_t least(uint32_t one, uint32_t other)
+{
+    return one < other ? one : other;
+}
+
+static uint32_t most(uint32_t one, uint32_t other)
+{
+    return one > other ? one : other;
+}
+
 /* --- frames that are sent */
 
 /* Characters do not arrive before they can. */
@@ -81,10 +91,8 @@ void mbm_portTest_checkWrite(mbm_portTest *test)
         if (!can_send_all(test, &all))
             return;
         tries++;
-        if (all.longestWriteUs < longest_write)
-            longest_write = all.longestWriteUs;
-        if (all.lastUs < last)
-            last = all.lastUs;
+        longest_write = least(longest_write, all.longestWriteUs);
+        last = least(last, all.lastUs);
         is_long = lasts > 0 && ((longest_write > may_wait && !test->mayWait) || last > may_last);
     } while (is_long && mbm_portTest_tries_again(test, began, tries));
     if (lasts > 0 && longest_write > may_wait && !test->mayWait)
@@ -114,19 +122,7 @@ void mbm_portTest_checkWrite(mbm_portTest *test)
 /* A device may reply 3.5 characters after the last bit, and above 19200 baud 1750 us. */
 static uint32_t reply_may_begin(const mbm_portTest *test)
 {
-    const uint32_t us = mbm_portTest_characters(test, 7) / 2;
-
-    return us > 1750 ? us : 1750;
-}
-
-static uint32_t least(uint32_t one, uint32_t other)
-{
-    return one < other ? one : other;
-}
-
-static uint32_t most(uint32_t one, uint32_t other)
-{
-    return one > other ? one : other;
+    return most(mbm_portTest_characters(test, 7) / 2, 1750);
 }
 
 /* Microseconds in which flush may return 1. */
@@ -135,8 +131,8 @@ static uint32_t flush_may_take(const mbm_portTest *test)
     return mbm_portTest_characters(test, FEW) + reply_may_begin(test) + mbm_portTest_step(test);
 }
 
-/* Flush returned 0 when the last bit had left long before, or it waited for so long. In a call that
- * waits the task may be away for another reason, and the shortest counts. */
+/* Whether flush returned 0 although the last bit had left long before, or waited until long after.
+ * Other tasks may delay a call that waits, so of several frames the shortest wait counts. */
 static uint8_t is_flush_late(const mbm_portTest *test, const passage *few)
 {
     return most(few->askedUs, few->waitedUs) > flush_may_take(test);
@@ -149,10 +145,32 @@ static uint8_t is_seen(const mbm_portTest *test, const passage *few)
            few->unseenUs + mbm_portTest_step(test) < mbm_portTest_characters(test, FEW - 1);
 }
 
+/* Other tasks may delay a flush that waits. A flush that returned 0 is the port's own. */
+static void judge_late_flush(mbm_portTest *test, const passage *few)
+{
+    const uint32_t may_take = flush_may_take(test);
+
+    if (few->askedUs <= may_take) {
+        const uint32_t away = mbm_portTest_away(test);
+
+        if (few->waitedUs <= may_take + away) {
+            SAY_NUMBERS(
+                test, MBM_PORT_LEFT_OUT,
+                "Whether `flush` is late was not measured: other tasks take the processor for % us at a time.",
+                away);
+            return;
+        }
+    }
+    SAY_NUMBERS(
+        test, MBM_PORT_WRONG,
+        "`flush` returned 1 % us after the last bit: a device may reply before, and the driver is still on. Ask "
+        "for transmission complete.",
+        most(few->askedUs, few->flushedUs) - mbm_portTest_characters(test, FEW));
+}
+
 static void judge_flush(mbm_portTest *test, const passage *few)
 {
     const uint32_t shortest = few->flushedUs;
-    uint32_t away;
     const uint32_t lasts = mbm_portTest_characters(test, FEW),
                    half = mbm_portTest_characters(test, 1) / 2;
 
@@ -171,20 +189,8 @@ static void judge_flush(mbm_portTest *test, const passage *few)
             "`flush` returned 1 after % us, and % characters last %: it must wait for the last bit. Ask for "
             "transmission complete, not for an empty register, FIFO or DMA.",
             shortest, FEW, lasts);
-    else if (!is_flush_late(test, few))
-        return;
-    else if (few->askedUs <= flush_may_take(test) &&
-             few->waitedUs <= flush_may_take(test) + (away = mbm_portTest_away(test)))
-        SAY_NUMBERS(
-            test, MBM_PORT_LEFT_OUT,
-            "Whether `flush` is late was not measured: other tasks take the processor for % us at a time.",
-            away);
-    else
-        SAY_NUMBERS(
-            test, MBM_PORT_WRONG,
-            "`flush` returned 1 % us after the last bit: a device may reply before, and the driver is still on. Ask "
-            "for transmission complete.",
-            most(few->askedUs, shortest) - lasts);
+    else if (is_flush_late(test, few))
+        judge_late_flush(test, few);
 }
 
 static void judge_driver(mbm_portTest *test, const passage *few)
@@ -294,11 +300,11 @@ static uint32_t lateness(const mbm_portTest *test, const passage *bytes)
     const uint32_t end = bytes->lastUs > lasts ? bytes->lastUs - lasts : 0,
                    pause = bytes->longestPauseUs > block ? bytes->longestPauseUs - block : 0;
 
-    return end > pause ? end : pause;
+    return most(end, pause);
 }
 
-/* How late bytes come, of which the test itself is away for some time, and which setting suits
- * that. */
+/* Says how late bytes come, and which setting suits that. `yields` is for how long the test itself
+ * was away at a time. */
 static void advise(mbm_portTest *test, uint32_t late, uint32_t yields)
 {
     const uint16_t block = test->longestBlock;

@@ -14,7 +14,8 @@ enum { SPACE = 64 };
 enum { SPACE = 300 };
 #endif
 
-/* While the task of the test is away, nobody asks the port: of such a time so much counts. */
+/* Of a turn of the loop that took longer, this time alone counts as waiting: other tasks had the
+ * processor, and the test did not call the port. */
 #define MOST_OF_A_TURN (PATIENCE / 8)
 
 /* A byte that no read may change. */
@@ -132,7 +133,7 @@ typedef struct times {
     uint32_t takenAt;  /* the end of the last write */
     uint32_t turnAt;   /* the begin of this turn of the loop */
     uint32_t waited;   /* since a byte moved */
-    uint32_t sure;     /* so long after it the last bit has surely not left; 0: not known */
+    uint32_t sure;     /* after `began`: until then the last bit cannot have left; 0: not known */
     uint32_t readAt;   /* of the last byte */
     uint32_t lookedAt; /* at the pin of the driver */
 } times;

@@ -83,7 +83,7 @@ uint32_t mbm_portTest_step(const mbm_portTest *test);
 uint8_t mbm_portTest_tries_again(const mbm_portTest *test, uint32_t began, uint8_t tries);
 
 /* Returns for how long other tasks take the processor at a time, as the clock shows in a fifth of a
- * second. A task that sleeps may wake so much later. */
+ * second. A task that sleeps may wake later by that time. */
 uint32_t mbm_portTest_away(const mbm_portTest *test);
 
 /* How many microseconds `count` characters last; 0 without a baud rate. */
