@@ -20,7 +20,7 @@ typedef struct held_clock {
     int64_t stopped;  /* the time that it shows while it stands still */
     int64_t readTime; /* the time that the master read last */
     int64_t due;      /* the time that it does not go beyond */
-    int64_t seen;     /* nor beyond this one, until a master looks again that says when it sleeps */
+    int64_t seen;     /* nor beyond this one, once the master has called held_clock_sleep */
     uint32_t bytes;   /* bytes that were written and that the device has not processed */
     unsigned link;    /* how many connections were forgotten */
     mbm_port port;    /* the line's port */
@@ -34,8 +34,8 @@ int64_t held_clock_now(held_clock *c);
 /* For the master: the line's port, with this clock. */
 mbm_port held_clock_port(held_clock *c, const mbm_port *line);
 
-/* For a master that says when it sleeps, before it does, and at its begin: so long it does not
- * look. From then on the clock waits for it. */
+/* For a master that says when it sleeps: it calls this at its begin, and before it sleeps for
+ * `microseconds`. From the end of the sleep on, the clock waits until the master looks. */
 void held_clock_sleep(held_clock *c, int64_t microseconds);
 
 /* For the device: it has processed `bytes` bytes of a link. `link` is the value that
