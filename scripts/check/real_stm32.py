@@ -75,21 +75,25 @@ class Family:
                                             "-c", source, "-o", objects[-1]])
         return objects
 
-    def build(self, example: str, *defines: str, port: bool = True) -> pathlib.Path:
-        """Compiles the port, an example and what CubeMX makes, and links them. Returns the image."""
-        root, kits = self.kit.root, self.kit.root / "firmware-tests/kits/stm32"
+    def build(self, example: str, *defines: str) -> pathlib.Path:
+        """Builds an example with the port and the library. Returns the image."""
+        root = self.kit.root
         name = "-".join([example, *(define[2:].partition("=")[0].lower() for define in defines)])
-        sources = [kits / "main.c", root / f"examples/stm32/{example}.c", root / "ports/stm32/mbm_stm32.c",
-                   root / "ports/stm32/mbm_stm32_callbacks.c"]
+        sources = [root / f"examples/stm32/{example}.c", root / "ports/stm32/mbm_stm32.c", root / "ports/stm32/mbm_stm32_callbacks.c"]
+        return self.link(name, sources, [*OURS.split(), *defines], self.archive)
+
+    def link(self, name: str, sources: list, options: list, *more) -> pathlib.Path:
+        """Compiles sources and what CubeMX makes, and links them with the HAL, and with objects and archives. Returns the image."""
+        root, kits = self.kit.root, self.kit.root / "firmware-tests/kits/stm32"
         objects = []
-        for source in sources:
+        for source in (kits / "main.c", *sources):
             objects.append(self.work / f"{name}-{source.stem}.o")
-            self.kit.run(self.kit.log, [*self.cc, *OURS.split(), *defines, f"-I{root}/include", f"-I{root}/ports/stm32",
-                                        f"-I{root}/examples/stm32", f"-I{kits}", *self.headers, "-c", source, "-o", objects[-1]])
+            self.kit.run(self.kit.log, [*self.cc, *options, f"-I{root}/include", f"-I{root}/ports/stm32", f"-I{root}/examples/stm32",
+                                        f"-I{kits}", *self.headers, "-c", source, "-o", objects[-1]])
         image = self.work / f"{name}.elf"
         self.kit.run(self.kit.log, [*self.cc, "--specs=nano.specs", "--specs=rdimon.specs", "-T",
                                     self.work / "chip.ld", "-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", f"-Wl,-Map,{image}.map",
-                                    *objects, *self.objects, self.archive, "-o", image])
+                                    *objects, *self.objects, *more, "-o", image])
         return image
 
 
