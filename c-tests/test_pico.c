@@ -5,7 +5,7 @@
 
 #include "hardware/irq.h"
 
-enum { DRIVER = 6, RECEIVED = 8 };
+enum { DRIVER = 6, RECEIVED = 8, LONG_RESPONSE = 245 };
 
 static mbm_picoUart line;
 static mbm_picoUsb usb;
@@ -18,8 +18,8 @@ static uint8_t frame[MBM_MAX_FRAME];
 /* Reads registers 0 and 1 of unit 1, and the response. */
 static const uint8_t request[] = {1, 3, 0, 0, 0, 2, 0xC4, 0x0B};
 static const uint8_t response[] = {1, 3, 4, 2, 0x2B, 0, 100, 0x8A, 0x68};
-/* Reads 60 registers. Its response of 125 bytes is longer than TinyUSB's buffer. */
-static const uint8_t long_request[] = {1, 3, 0, 0, 0, 60, 0x45, 0xDB};
+/* Reads 120 registers. TinyUSB's buffer and the endpoint together do not hold its response. */
+static const uint8_t long_request[] = {1, 3, 0, 0, 0, 120, 0x45, 0xE8};
 
 static void set_up(void)
 {
@@ -158,6 +158,160 @@ TEST(damaged_characters_are_counted_and_passed_on)
     assert_int_equal(line.damaged, 3);
 }
 
+/* --- a frame that does not leave */
+
+/* Begins a server, and polls it until it sends the response to a request. */
+static void begin_to_answer(void)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
+    OK(mbm_server_setBaudRate(&server, line.baud));
+    receive(long_request, sizeof long_request);
+    while (!chip.pins[DRIVER]) {
+        chip.now += 500;
+        mbm_server_poll(&server);
+    }
+}
+
+/* Polls a server whose response does not leave, until the driver is off. Returns how long that
+ * took, in milliseconds. */
+static uint32_t until_given_up(void)
+{
+    const uint32_t since = chip.now;
+
+    while (chip.pins[DRIVER]) {
+        chip.now += 1000;
+        assert_in_range(chip.now - since, 0, 10000000);
+        mbm_server_poll(&server);
+    }
+    return (chip.now - since) / 1000;
+}
+
+/* Reads all that the UART sends as response to the short request. */
+static void answers_on_the_uart(void)
+{
+    chip.sent = 0;
+    receive(request, sizeof request);
+    for (int i = 0; i < 100; i++, chip.now += 500) {
+        mbm_server_poll(&server);
+        pico_send();
+    }
+    assert_int_equal(chip.sent, sizeof response);
+    assert_memory_equal(chip.line, response, sizeof response);
+    assert_false(chip.pins[DRIVER]);
+}
+
+TEST(a_response_that_stops_at_any_character_is_given_up_and_the_next_one_is_whole)
+{
+    for (unsigned at = 0; at < LONG_RESPONSE; at++) {
+        set_up();
+        begin_to_answer();
+        while (chip.sent < at)
+            pico_send();
+        /* Twice the time of its characters and of a full FIFO, at 12 bits each, and 50 ms. */
+        assert_in_range(until_given_up(), 396, 397);
+        assert_int_equal(line.stalled, 1);
+        IS(MBM_LINK_LOST, mbm_server_poll(&server));
+        assert_int_equal(mbm_server_poll(&server), MBM_OK);
+        chip.now += 1000000;
+        answers_on_the_uart();
+        assert_int_equal(line.stalled, 1);
+    }
+}
+
+TEST(a_response_whose_interrupt_does_not_come_is_given_up)
+{
+    begin_to_answer();
+    irq_set_enabled(UART1_IRQ, false);
+    while (pico_send())
+        ;
+    assert_int_equal(chip.sent, PICO_FIFO);
+    until_given_up();
+    assert_int_equal(line.stalled, 1);
+    irq_set_enabled(UART1_IRQ, true);
+    IS(MBM_LINK_LOST, mbm_server_poll(&server));
+    chip.now += 1000000;
+    answers_on_the_uart();
+}
+
+TEST(a_request_that_does_not_leave_ends_its_call_and_the_next_one_leaves)
+{
+    mbm_line bus = MBM_INIT;
+    mbm_node node = MBM_INIT;
+    uint16_t taken[2] = {0};
+
+    OK(mbm_picoUart_open(&line, &port));
+    OK(mbm_line_beginRtu(&bus, &port, frame, sizeof frame));
+    OK(mbm_line_setBaudRate(&bus, line.baud));
+    OK(mbm_node_begin(&node, &bus, 1, taken, 2, NULL, 0));
+    OK(mbm_node_setBlocking(&node, 0));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&node, 0, 2));
+    while (mbm_node_poll(&node) == MBM_PENDING)
+        chip.now += 1000;
+    IS(MBM_LINK_LOST, mbm_node_status(&node));
+    assert_int_equal(line.stalled, 1);
+    assert_false(chip.pins[DRIVER]);
+    chip.now += 1000000;
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&node, 0, 2));
+    while (chip.sent < sizeof request) {
+        chip.now += 500;
+        IS(MBM_PENDING, mbm_node_poll(&node));
+        pico_send();
+    }
+    assert_memory_equal(chip.line, request, sizeof request);
+    IS(MBM_PENDING, mbm_node_poll(&node));
+    receive(response, sizeof response);
+    while (mbm_node_poll(&node) == MBM_PENDING)
+        chip.now += 500;
+    OK(mbm_node_status(&node));
+    assert_int_equal(taken[0], 555);
+}
+
+/* A piece of a frame in ASCII is taken while the FIFO still holds 32 characters of the one
+ * before, which last 320 ms. */
+TEST(a_short_piece_after_a_full_fifo_is_not_given_up)
+{
+    const uint32_t character = 12 * 1000000 / 1200;
+
+    line.baud = 1200;
+    OK(mbm_picoUart_open(&line, &port));
+    assert_int_equal(port.write(port.context, long_request, sizeof long_request),
+                     sizeof long_request);
+    for (unsigned pieces = 0; pieces < 3; pieces++)
+        port.write(port.context, long_request, sizeof long_request);
+    assert_int_equal(port.write(port.context, long_request, 1), 1);
+    for (unsigned sent = 0; sent < PICO_FIFO + 1; sent++) {
+        chip.now += character;
+        assert_int_equal(port.flush(port.context), 0);
+        assert_true(pico_send());
+    }
+    assert_int_equal(port.flush(port.context), 1);
+    assert_int_equal(line.stalled, 0);
+}
+
+TEST(a_frame_that_has_left_is_not_given_up_when_the_program_comes_late)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    assert_int_equal(port.write(port.context, response, sizeof response), sizeof response);
+    while (pico_send())
+        ;
+    chip.now += 60000000;
+    assert_int_equal(port.flush(port.context), 1);
+    assert_int_equal(port.write(port.context, response, sizeof response), sizeof response);
+    assert_int_equal(line.stalled, 0);
+}
+
+TEST(a_line_whose_frame_does_not_leave_is_opened_again_after_its_time)
+{
+    OK(mbm_picoUart_open(&line, &port));
+    assert_int_equal(port.write(port.context, frame, sizeof frame), sizeof frame);
+    chip.now += 300000;
+    IS(MBM_BUSY, mbm_picoUart_open(&line, &port));
+    chip.now += 500000;
+    OK(mbm_picoUart_open(&line, &port));
+    assert_int_equal(port.write(port.context, frame, sizeof frame), sizeof frame);
+}
+
 TEST(a_uart_that_cannot_be_is_refused)
 {
     IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(NULL, &port));
@@ -251,21 +405,93 @@ TEST(a_response_waits_for_a_host_that_does_not_read)
     chip.reads = true;
     for (int i = 0; i < 20; i++)
         turn();
-    assert_int_equal(chip.toHostLength, 125);
+    assert_int_equal(chip.toHostLength, LONG_RESPONSE);
     answers();
 }
 
-TEST(a_response_that_was_not_read_is_not_for_the_next_program)
+/* The packet in the endpoint cannot be taken back. */
+TEST(of_a_response_that_was_not_read_the_next_program_gets_one_packet_at_most)
 {
     serve_usb();
     turn();
     chip.reads = false;
-    pico_from_host(request, sizeof request);
+    pico_from_host(long_request, sizeof long_request);
     for (int i = 0; i < 10; i++)
         turn();
     chip.isOpen = false;
     turn();
     chip.isOpen = chip.reads = true;
+    for (int i = 0; i < 10; i++)
+        turn();
+    assert_int_equal(chip.toHostLength, PICO_PACKET);
+    answers();
+}
+
+TEST(a_host_that_closes_its_port_while_the_last_bytes_wait_is_a_lost_link)
+{
+    serve_usb();
+    chip.reads = false;
+    for (int i = 0; i < 2; i++) {
+        pico_from_host(request, sizeof request);
+        OK(mbm_server_poll(&server));
+    }
+    chip.isOpen = false;
+    mbm_server_poll(&server);
+    IS(MBM_LINK_LOST, mbm_server_poll(&server));
+    chip.isOpen = chip.reads = true;
+    turn();
+    answers();
+}
+
+/* Polls for a second, in which the host reads nothing of a response. */
+static void is_given_up_in_a_second(void)
+{
+    const uint32_t since = chip.now;
+    uint8_t status = MBM_OK;
+
+    while (status != MBM_LINK_LOST) {
+        assert_true(chip.now - since < 1010000);
+        chip.now += 1000;
+        status = mbm_server_poll(&server);
+    }
+    assert_in_range(chip.now - since, 1000000, 1010000);
+    assert_int_equal(usb.stalled, 1);
+}
+
+TEST(a_response_that_the_host_does_not_read_is_given_up_and_the_next_one_is_whole)
+{
+    for (int isShort = 0; isShort < 2; isShort++) {
+        set_up();
+        serve_usb();
+        turn();
+        chip.reads = false;
+        /* The endpoint takes a short response. Behind it another one waits in the buffer. */
+        for (int i = 0; i <= isShort; i++) {
+            pico_from_host(isShort ? request : long_request, sizeof request);
+            turn();
+        }
+        is_given_up_in_a_second();
+        chip.reads = true;
+        turn();
+        answers();
+        assert_int_equal(usb.stalled, 1);
+    }
+}
+
+TEST(a_host_that_reads_slowly_gets_the_whole_response)
+{
+    serve_usb();
+    turn();
+    pico_from_host(long_request, sizeof long_request);
+    while (chip.toHostLength < LONG_RESPONSE) {
+        /* It takes a packet every 900 ms. */
+        chip.reads = chip.now % 900000 < 1000;
+        chip.now += 1000;
+        IS(MBM_OK, mbm_server_poll(&server));
+    }
+    assert_true(chip.now > 3 * 900000);
+    assert_int_equal(usb.stalled, 0);
+    chip.reads = true;
     answers();
 }
 

@@ -19,15 +19,17 @@ struct uart_inst {
 static struct uart_inst uarts[2];
 uart_inst_t *const uart0 = &uarts[0];
 uart_inst_t *const uart1 = &uarts[1];
-static uint8_t fromHost[PICO_USB_BUFFER], packet[CFG_TUD_CDC_TX_BUFSIZE];
-static unsigned fromHostLength, packetLength;
+static uint8_t fromHost[PICO_USB_BUFFER], waiting[CFG_TUD_CDC_TX_BUFSIZE], packet[PICO_PACKET];
+static unsigned fromHostLength, waitingLength;
+/* What is in the endpoint, from which nothing can be taken back. */
+static unsigned packetLength;
 
 void pico_reset(void)
 {
     memset(&chip, 0, sizeof chip);
     memset(uarts, 0, sizeof uarts);
     chip.isUp = chip.isOpen = chip.reads = true;
-    fromHostLength = packetLength = 0;
+    fromHostLength = waitingLength = packetLength = 0;
 }
 
 /* --- UART 1 */
@@ -71,7 +73,7 @@ unsigned pico_take(void)
 
 bool pico_send(void)
 {
-    if (uart1->toSendCount == 0)
+    if (uart1->toSendCount == 0 || uart1->hw.cr != UART_UARTCR_UARTEN_BITS)
         return false;
     chip.line[chip.sent++] = uart1->toSend[0];
     uart1->toSendCount--;
@@ -96,7 +98,8 @@ uint uart_get_index(uart_inst_t *uart)
 
 uint uart_init(uart_inst_t *uart, uint baud)
 {
-    (void)uart;
+    uart->receivedCount = uart->toSendCount = 0;
+    uart->hw = (uart_hw_t){.cr = UART_UARTCR_UARTEN_BITS};
     return chip.baud = baud;
 }
 
@@ -110,8 +113,7 @@ void uart_set_format(uart_inst_t *uart, uint bits, uint stop, uart_parity_t pari
 
 void uart_set_fifo_enabled(uart_inst_t *uart, bool enabled)
 {
-    (void)uart;
-    (void)enabled;
+    uart->hw.lcr_h = enabled ? UART_UARTLCR_H_FEN_BITS : 0;
 }
 
 void uart_set_irqs_enabled(uart_inst_t *uart, bool receives, bool sends)
@@ -146,6 +148,13 @@ void hw_set_bits(volatile uint32_t *where, uint32_t bits)
 void hw_clear_bits(volatile uint32_t *where, uint32_t bits)
 {
     *where &= ~bits;
+    /* The UART must be off when its FIFOs are switched off, which empties them. */
+    for (uart_inst_t *uart = uarts; uart < uarts + 2; uart++)
+        if (where == &uart->hw.lcr_h && (bits & UART_UARTLCR_H_FEN_BITS) &&
+            !(uart->hw.cr & UART_UARTCR_UARTEN_BITS)) {
+            uart->receivedCount = uart->toSendCount = 0;
+            uart->hw.fr &= ~UART_UARTFR_BUSY_BITS;
+        }
 }
 
 void irq_set_exclusive_handler(uint number, void (*handler)(void))
@@ -226,11 +235,12 @@ void tud_task_ext(uint32_t most, bool inInterrupt)
     (void)inInterrupt;
     chip.tasks++;
     if (!chip.isUp)
-        fromHostLength = packetLength = 0;
+        fromHostLength = waitingLength = packetLength = 0;
     if (chip.reads) {
         memcpy(chip.toHost + chip.toHostLength, packet, packetLength);
         chip.toHostLength += packetLength;
         packetLength = 0;
+        tud_cdc_n_write_flush(0);
     }
 }
 
@@ -265,26 +275,32 @@ void tud_cdc_n_read_flush(uint8_t number)
 uint32_t tud_cdc_n_write(uint8_t number, const void *bytes, uint32_t length)
 {
     (void)number;
-    memcpy(packet + packetLength, bytes, length);
-    packetLength += length;
+    memcpy(waiting + waitingLength, bytes, length);
+    waitingLength += length;
     return length;
 }
 
 uint32_t tud_cdc_n_write_available(uint8_t number)
 {
     (void)number;
-    return CFG_TUD_CDC_TX_BUFSIZE - packetLength;
+    return CFG_TUD_CDC_TX_BUFSIZE - waitingLength;
 }
 
 uint32_t tud_cdc_n_write_flush(uint8_t number)
 {
     (void)number;
-    return 0;
+    if (packetLength > 0)
+        return 0;
+    packetLength = waitingLength < PICO_PACKET ? waitingLength : PICO_PACKET;
+    memcpy(packet, waiting, packetLength);
+    waitingLength -= packetLength;
+    memmove(waiting, waiting + packetLength, waitingLength);
+    return packetLength;
 }
 
 bool tud_cdc_n_write_clear(uint8_t number)
 {
     (void)number;
-    packetLength = 0;
+    waitingLength = 0;
     return true;
 }

@@ -5,7 +5,7 @@
 
 #include "hardware/uart.h"
 
-enum { PICO_FIFO = 32, PICO_USB_BUFFER = 64 };
+enum { PICO_FIFO = 32, PICO_USB_BUFFER = 64, PICO_PACKET = 64 };
 
 typedef struct pico {
     uint32_t now; /* microseconds */

@@ -32,12 +32,15 @@ typedef struct mbm_picoUart {
 
     volatile uint16_t overruns; /**< how often the FIFO was full and characters were lost */
     volatile uint16_t damaged;  /**< characters with a wrong stop bit or parity, and breaks */
+    uint16_t stalled;           /**< frames that did not leave in their time, and were dropped */
 
     mbm_ring ring;                        /**< private: received bytes */
     uint8_t ringBytes[MBM_MAX_FRAME + 1]; /**< private */
     uint8_t toSend[MBM_MAX_FRAME];        /**< private */
     volatile uint16_t next;               /**< private: the first byte that is not in the FIFO */
     volatile uint16_t end;                /**< private: the end of the bytes to send */
+    uint32_t sentAt, sendingTime;         /**< private */
+    bool hasFailed;                       /**< private */
 } mbm_picoUart;
 
 /**
@@ -62,7 +65,11 @@ uint16_t mbm_picoUart_lost(const mbm_picoUart *line);
 typedef struct mbm_picoUsb {
     uint8_t number;  /**< which serial port, if there are several: 0 is the first */
     bool hasOwnTask; /**< the program calls tud_task itself; otherwise every read does */
-    bool wasOpen;    /**< private */
+
+    uint16_t stalled; /**< responses and requests that the host did not read, and were dropped */
+
+    bool wasOpen, hasFailed; /**< private */
+    uint32_t space, since;   /**< private */
 } mbm_picoUsb;
 
 /**

@@ -9,6 +9,12 @@
 
 enum { PINS = 30, SHORTEST_SLEEP = 20 /* microseconds */ };
 
+/* The most bits of a character: start, data, parity or a second stop bit, stop. */
+enum { BITS = 12, FIFO = 32 /* characters */ };
+
+/* Milliseconds that a frame may take longer than twice its characters. */
+enum { PATIENCE = 50 };
+
 /* The lines that are open, for their interrupts. */
 static mbm_picoUart *lines[2];
 
@@ -59,6 +65,49 @@ static void interrupt_1(void)
     interrupt(lines[1]);
 }
 
+/* --- a frame that does not leave */
+
+/* The busy flag is set until the stop bit of the last character has left. */
+static bool is_sending(const mbm_picoUart *line)
+{
+    return line->next != line->end || (uart_get_hw(line->uart)->fr & UART_UARTFR_BUSY_BITS);
+}
+
+static bool is_overdue(const mbm_picoUart *line)
+{
+    return time_us_32() - line->sentAt >= line->sendingTime;
+}
+
+/* Drops a frame that takes too long: the interrupt is off, CTS holds it back, or the UART has no
+ * clock. The next call reports it. */
+static void end_if_overdue(mbm_picoUart *line)
+{
+    uart_hw_t *hw = uart_get_hw(line->uart);
+    uint32_t settings;
+
+    if (!is_sending(line) || !is_overdue(line))
+        return;
+    hw_clear_bits(&hw->imsc, UART_UARTIMSC_TXIM_BITS);
+    line->next = line->end;
+    /* The UART empties its FIFOs when they are switched off. It must be off itself meanwhile. */
+    settings = hw->cr;
+    hw_clear_bits(&hw->cr, UART_UARTCR_UARTEN_BITS);
+    hw_clear_bits(&hw->lcr_h, UART_UARTLCR_H_FEN_BITS);
+    hw_set_bits(&hw->lcr_h, UART_UARTLCR_H_FEN_BITS);
+    hw->cr = settings;
+    line->stalled++;
+    line->hasFailed = true;
+}
+
+/* Returns true once after a frame was dropped. */
+static bool take_failure(mbm_picoUart *line)
+{
+    const bool hasFailed = line->hasFailed;
+
+    line->hasFailed = false;
+    return hasFailed;
+}
+
 /* --- the hooks */
 
 static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
@@ -67,6 +116,8 @@ static int16_t line_read(void *context, uint8_t *bytes, uint16_t capacity)
     uart_hw_t *hw = uart_get_hw(line->uart);
     const uint32_t on = UART_UARTIMSC_RXIM_BITS | UART_UARTIMSC_RTIM_BITS;
 
+    if (take_failure(line))
+        return -1;
     /* The interrupt comes with the fourth character, or 32 bits after the last one. What is in the
      * FIFO before that is taken here, so that silence is seen when it begins. */
     hw_clear_bits(&hw->imsc, on);
@@ -80,11 +131,17 @@ static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
     mbm_picoUart *line = context;
     uart_hw_t *hw = uart_get_hw(line->uart);
 
+    end_if_overdue(line);
+    if (take_failure(line))
+        return -1;
     if (line->next != line->end)
         return 0;
     if (length > sizeof line->toSend)
         length = sizeof line->toSend;
     memcpy(line->toSend, bytes, length);
+    line->sentAt = time_us_32();
+    /* The FIFO may be full of the characters before. */
+    line->sendingTime = (2u * (length + FIFO) * BITS * 1000u / line->baud + PATIENCE) * 1000u;
     /* The interrupt comes only when the FIFO becomes emptier, so the first bytes go in here. */
     line->next = 0;
     line->end = length;
@@ -96,10 +153,10 @@ static int16_t line_write(void *context, const uint8_t *bytes, uint16_t length)
 
 static uint8_t line_flush(void *context)
 {
-    const mbm_picoUart *line = context;
+    mbm_picoUart *line = context;
 
-    /* The flag is set until the stop bit of the last character has left. */
-    return line->next == line->end && !(uart_get_hw(line->uart)->fr & UART_UARTFR_BUSY_BITS);
+    end_if_overdue(line);
+    return line->hasFailed || !is_sending(line);
 }
 
 static uint32_t line_micros(void *context)
@@ -159,8 +216,9 @@ uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port)
     if (line == NULL || port == NULL || line->uart == NULL || line->baud == 0 ||
         line->txPin >= PINS || line->rxPin >= PINS || line->driverPin >= PINS)
         return MBM_INVALID_ARGUMENT;
-    if (line->next != line->end)
+    if (line->next != line->end && !is_overdue(line))
         return MBM_BUSY;
+    line->next = line->end = 0;
     if (line->hasDriver)
         begin_driver(line);
     uart_init(line->uart, line->baud);
@@ -172,6 +230,8 @@ uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port)
     gpio_pull_up(line->rxPin);
     line->overruns = 0;
     line->damaged = 0;
+    line->stalled = 0;
+    line->hasFailed = false;
     mbm_ring_begin(&line->ring, line->ringBytes, sizeof line->ringBytes);
     begin_interrupt(line);
     *port = hooks;

@@ -10,13 +10,15 @@ typedef unsigned int uint;
 typedef struct uart_inst uart_inst_t;
 typedef enum { UART_PARITY_NONE, UART_PARITY_EVEN, UART_PARITY_ODD } uart_parity_t;
 typedef struct uart_hw {
-    volatile uint32_t fr, imsc;
+    volatile uint32_t fr, imsc, cr, lcr_h;
     volatile uint32_t data[1];
 } uart_hw_t;
 /* A read of the data register takes a character out of the FIFO. */
 #define dr data[pico_take()]
 
 #define UART_UARTFR_BUSY_BITS (1u << 3)
+#define UART_UARTCR_UARTEN_BITS 1u
+#define UART_UARTLCR_H_FEN_BITS (1u << 4)
 #define UART_UARTDR_FE_BITS (1u << 8)
 #define UART_UARTDR_PE_BITS (1u << 9)
 #define UART_UARTDR_BE_BITS (1u << 10)
