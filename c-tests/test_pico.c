@@ -321,7 +321,15 @@ TEST(a_uart_that_cannot_be_is_refused)
     line.driverPin = DRIVER;
     line.baud = 0;
     IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    line.baud = PICO_CLOCK / 16 + 1;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    line.baud = PICO_CLOCK / 16 / 65535 - 1;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    assert_int_equal(chip.baud, 0);
     line.baud = 9600;
+    chip.hasNoClock = true;
+    IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
+    chip.hasNoClock = false;
     line.uart = NULL;
     IS(MBM_INVALID_ARGUMENT, mbm_picoUart_open(&line, &port));
     line.uart = uart1;

@@ -1,5 +1,6 @@
 #include "pico_model.h"
 
+#include "hardware/clocks.h"
 #include "hardware/gpio.h"
 #include "hardware/irq.h"
 #include "pico/time.h"
@@ -167,7 +168,13 @@ void irq_set_enabled(uint number, bool enabled)
     uarts[number - UART0_IRQ].isOn = enabled;
 }
 
-/* --- pins and clock */
+/* --- pins and clocks */
+
+uint32_t clock_get_hz(uint clock)
+{
+    (void)clock;
+    return chip.hasNoClock ? 0 : PICO_CLOCK;
+}
 
 void gpio_init(uint pin)
 {

@@ -5,11 +5,12 @@
 
 #include "hardware/uart.h"
 
-enum { PICO_FIFO = 32, PICO_USB_BUFFER = 64, PICO_PACKET = 64 };
+enum { PICO_FIFO = 32, PICO_USB_BUFFER = 64, PICO_PACKET = 64, PICO_CLOCK = 125000000 };
 
 typedef struct pico {
     uint32_t now; /* microseconds */
     bool pins[30];
+    bool hasNoClock; /* the UARTs' clock is stopped */
     uint baud, stop;
     uint8_t line[600]; /* what UART 1 has sent */
     unsigned sent;

@@ -48,8 +48,8 @@ typedef struct mbm_picoUart {
  *
  * @param line  the settings
  * @param port  receives the port for the begin functions
- * @return MBM_OK; MBM_INVALID_ARGUMENT for NULL, a rate of 0 or that the UART cannot have, or a
- * GPIO above 29; MBM_BUSY while a frame is being sent
+ * @return MBM_OK; MBM_INVALID_ARGUMENT for NULL, a rate of 0 or that the UART cannot have from its
+ * clock, 119 to 7 812 500 at 125 MHz, or a GPIO above 29; MBM_BUSY while a frame is being sent
  */
 uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port);
 

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "hardware/clocks.h"
 #include "hardware/gpio.h"
 #include "hardware/irq.h"
 #include "pico/time.h"
@@ -205,6 +206,14 @@ static void begin_interrupt(mbm_picoUart *line)
     uart_set_irqs_enabled(line->uart, true, false);
 }
 
+/* The UART divides its clock by 16, and by a number of 16 bits. */
+static bool has_rate(const mbm_picoUart *line)
+{
+    const uint32_t most = clock_get_hz(UART_CLOCK_NUM(line->uart)) / 16u;
+
+    return line->baud != 0 && line->baud <= most && line->baud >= most / 65535u;
+}
+
 uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port)
 {
     static const mbm_port hooks = {.read = line_read,
@@ -213,7 +222,7 @@ uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port)
                                    .flush = line_flush,
                                    .idle = line_idle};
 
-    if (line == NULL || port == NULL || line->uart == NULL || line->baud == 0 ||
+    if (line == NULL || port == NULL || line->uart == NULL || !has_rate(line) ||
         line->txPin >= PINS || line->rxPin >= PINS || line->driverPin >= PINS)
         return MBM_INVALID_ARGUMENT;
     if (line->next != line->end && !is_overdue(line))

@@ -29,6 +29,7 @@ typedef struct uart_hw {
 #define UART0_IRQ 20u
 #define UART1_IRQ 21u
 #define UART_FUNCSEL_NUM(uart, pin) 2u
+#define UART_CLOCK_NUM(uart) 6u
 
 extern uart_inst_t *const uart0;
 extern uart_inst_t *const uart1;
