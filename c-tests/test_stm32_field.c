@@ -159,7 +159,9 @@ TEST(the_first_frame_after_a_reset_has_its_driver_from_the_first_bit_to_the_last
     driver_of_first_frame(1);
 }
 
-/* STM32CubeL4 84: an error of the DMA of reception ends the transmission that is under way. */
+/* STM32CubeL4 84: an error of the DMA of reception ends the transmission that is under way. Once
+ * the UART has the last character in its FIFO, or in its register, that DMA has ended, and the
+ * response leaves whole. */
 TEST(a_reception_dma_that_fails_while_a_response_leaves_is_counted_and_the_next_one_is_whole)
 {
     for (unsigned at = 1; at < 40; at += 3) {
@@ -178,7 +180,7 @@ TEST(a_reception_dma_that_fails_while_a_response_leaves_is_counted_and_the_next_
         machine_run(1000);
         mbm_server_poll(&server);
         answers(2);
-        assert_int_equal(uart.stalled, 1);
+        assert_int_equal(uart.stalled, at + 1 + chip_kept() < 45);
         assert_true(uart.restarts > 0);
     }
 }

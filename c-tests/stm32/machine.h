@@ -56,7 +56,7 @@ void chip_idle(void);                             /* the line is silent for a ch
 int chip_next(void);                              /* the next character to send, or -1 */
 void chip_sent(void);                             /* there is none: the last bit has left */
 void chip_interrupts(void);                       /* calls the interrupts that wait */
-unsigned chip_kept(void);                         /* characters that the receiver keeps */
+unsigned chip_kept(void);                         /* characters that each direction keeps */
 int chip_is_driving(void);                        /* the pin, or the transmitter of a wire */
 /* What a program does with the HAL. */
 void chip_stop_uart(void);
