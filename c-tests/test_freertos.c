@@ -220,6 +220,18 @@ TEST(bytes_that_find_no_place_and_overruns_of_the_uart_are_counted_and_the_next_
     is_right();
 }
 
+/* Modbus-STM32-HAL-FreeRTOS 17: a character that arrives ends the wait for the end of the
+ * transmission. */
+TEST(a_byte_that_arrives_while_a_frame_leaves_does_not_end_it)
+{
+    chip.is_started = 0;
+    assert_int_equal(port.write(port.context, frame, 8), 8);
+    freertos_before_sleep = a_byte_arrives;
+    assert_int_equal(port.flush(port.context), 0);
+    assert_null(freertos_before_sleep);
+    assert_int_equal(mbm_freertos_stalled(&uart), 0);
+}
+
 TEST(a_frame_longer_than_its_storage_is_sent_in_parts)
 {
     mbm_freertos_close(&uart);
@@ -256,6 +268,41 @@ TEST(the_driver_goes_off_when_the_line_is_closed)
     assert_int_equal(chip.driver, 1);
     mbm_freertos_close(&uart);
     assert_int_equal(chip.driver, 0);
+}
+
+TEST(a_pin_that_cannot_be_set_is_a_lost_link_and_then_works)
+{
+    is_right();
+    for (unsigned i = 0; i < 2; i++) {
+        chip.pin_fails = 1;
+        IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&node, 20, 10));
+        IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&node, 20, 10));
+        chip.pin_fails = 0;
+        is_right();
+        assert_int_equal(chip.driver, 0);
+    }
+}
+
+TEST(a_pin_that_does_not_go_off_is_a_lost_link_and_goes_off_later)
+{
+    port.preTransmission(port.context);
+    assert_int_equal(chip.driver, 1);
+    chip.pin_fails = 1;
+    port.postTransmission(port.context);
+    IS(MBM_LINK_LOST, mbm_node_readHoldingRegisters(&node, 20, 10));
+    chip.pin_fails = 0;
+    is_right();
+    assert_int_equal(chip.driver, 0);
+}
+
+TEST(a_line_whose_pin_is_not_there_is_refused_and_opened_once_it_is)
+{
+    mbm_freertos_close(&uart);
+    chip.pin_fails = 1;
+    IS(MBM_LINK_LOST, mbm_freertos_open(&uart, &port));
+    chip.pin_fails = 0;
+    OK(mbm_freertos_open(&uart, &port));
+    is_right();
 }
 
 /* --- a port of another kind */

@@ -19,12 +19,15 @@ static void start_sending(void *context)
         must(write(chip.to_do[1], "s", 1) == 1, "start_sending");
 }
 
-static void set_driver(void *context, uint8_t on)
+static uint8_t set_driver(void *context, uint8_t on)
 {
+    if (chip.pin_fails)
+        return 0;
     chip.driver = on;
     chip.driver_was_on |= on;
     if (!on && pthread_equal(pthread_self(), chip.thread))
         chip.driver_in_interrupt++;
+    return 1;
 }
 
 static void send_interrupt(void)

@@ -13,7 +13,7 @@ extern struct uart_chip {
     int fd;
     int to_do[2]; /* a byte for each call of startSending, and 'q' for the end */
     volatile int is_started;
-    volatile int driver, driver_was_on, driver_in_interrupt;
+    volatile int driver, driver_was_on, driver_in_interrupt, pin_fails;
     pthread_t thread;
 } chip;
 

@@ -14,10 +14,26 @@ static TickType_t longest(const mbm_freertosUart *uart)
     return (TickType_t)(uart->end * (2u * BITS) * (uint32_t)configTICK_RATE_HZ / uart->baud + 2u);
 }
 
-static void switch_driver(const mbm_freertosUart *uart, uint8_t on)
+/* Returns whether the pin has this level, or there is none. */
+static uint8_t switch_driver(const mbm_freertosUart *uart, uint8_t on)
 {
-    if (uart->setDriver != NULL)
-        uart->setDriver(uart->context, on);
+    return uart->setDriver == NULL || uart->setDriver(uart->context, on) != 0;
+}
+
+static void release_line(mbm_freertosUart *uart)
+{
+    uart->isStuck = !switch_driver(uart, 0);
+}
+
+/* Reports a failure of the pin once, and one that does not go off until it does. */
+static uint8_t has_failed(mbm_freertosUart *uart)
+{
+    const uint8_t has = uart->hasFailed;
+
+    uart->hasFailed = 0;
+    if (uart->isStuck)
+        release_line(uart);
+    return has || uart->isStuck;
 }
 
 /* --- the interrupt */
@@ -45,7 +61,7 @@ void mbm_freertos_sentFromISR(mbm_freertosUart *uart, BaseType_t *woken)
     if (uart == NULL || !uart->isSending || uart->next < uart->end)
         return;
     if (!uart->hasNoSentInterrupt)
-        switch_driver(uart, 0);
+        release_line(uart);
     uart->isSending = 0;
     mbm_freertos_wakeFromISR(&uart->line, woken);
 }
@@ -62,7 +78,7 @@ static int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     mbm_freertosUart *uart = context;
 
-    if (!uart->isOpen)
+    if (!uart->isOpen || has_failed(uart))
         return -1;
     return (int16_t)mbm_ring_read(&uart->ring, bytes, capacity);
 }
@@ -97,7 +113,7 @@ static int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
     mbm_freertosUart *uart = context;
     uint16_t i;
 
-    if (!uart->isOpen)
+    if (!uart->isOpen || has_failed(uart))
         return -1;
     if (uart->isSending) {
         /* A blocking call asks again at once, and would keep tasks of lower priority from running.
@@ -138,7 +154,7 @@ static void driver_on(void *context)
     mbm_freertosUart *uart = context;
 
     uart->line.isTransmitting = 1;
-    switch_driver(uart, 1);
+    uart->hasFailed = !switch_driver(uart, 1);
 }
 
 static void driver_off(void *context)
@@ -148,7 +164,7 @@ static void driver_off(void *context)
     uart->line.isTransmitting = 0;
     if (uart->isSending)
         stall(uart);
-    switch_driver(uart, 0);
+    release_line(uart);
 }
 
 /* --- opening */
@@ -168,6 +184,8 @@ uint8_t mbm_freertos_open(mbm_freertosUart *uart, mbm_port *port)
         return MBM_INVALID_ARGUMENT;
     if (uart->isOpen)
         return MBM_BUSY;
+    if (!switch_driver(uart, 0))
+        return MBM_LINK_LOST;
     if (mbm_ring_begin(&uart->ring, uart->received, uart->receivedBytes) != MBM_OK)
         return MBM_INVALID_ARGUMENT;
     mbm_freertos_prepare(&uart->line);
@@ -176,7 +194,8 @@ uint8_t mbm_freertos_open(mbm_freertosUart *uart, mbm_port *port)
     uart->isSending = 0;
     uart->overruns = 0;
     uart->stalled = 0;
-    switch_driver(uart, 0);
+    uart->hasFailed = 0;
+    uart->isStuck = 0;
     *port = hooks;
     port->context = uart;
     uart->isOpen = 1;
@@ -189,7 +208,7 @@ void mbm_freertos_close(mbm_freertosUart *uart)
         return;
     uart->isOpen = 0;
     give_up(uart);
-    switch_driver(uart, 0);
+    release_line(uart);
     mbm_freertos_wake(&uart->line);
 }
 

@@ -30,8 +30,10 @@ typedef struct mbm_freertosUart {
      *  Called in the task. */
     void (*startSending)(void *context);
     /** NULL, or switches the driver of an RS-485 transceiver: `on` 1 before the first byte, in the
-     *  task; 0 after the last bit, in the interrupt that calls mbm_freertos_sentFromISR. */
-    void (*setDriver)(void *context, uint8_t on);
+     *  task; 0 after the last bit, in the interrupt that calls mbm_freertos_sentFromISR. Returns 1;
+     *  0 if the pin did not change. Then requests end with MBM_LINK_LOST, and a pin that did not go
+     *  off is switched off again in the task, until it is. */
+    uint8_t (*setDriver)(void *context, uint8_t on);
     uint32_t baud;          /**< bits per second */
     uint8_t *received;      /**< storage of the ring: for a server and a client MBM_MAX_FRAME + 1 */
     uint16_t receivedBytes; /**< bytes of it, 2 or more. The ring holds one byte less */
@@ -44,6 +46,8 @@ typedef struct mbm_freertosUart {
                                    hold (mbm_line_setPostFlushHold) */
     volatile uint8_t isOpen;    /**< private */
     volatile uint8_t isSending; /**< private */
+    volatile uint8_t isStuck;   /**< private: the pin did not go off */
+    uint8_t hasFailed;          /**< private: the next hook says so */
     volatile uint16_t next;     /**< private */
     volatile uint16_t end;      /**< private */
     volatile uint16_t overruns; /**< private */
@@ -63,7 +67,7 @@ typedef struct mbm_freertosUart {
  * @param uart  the settings
  * @param port  receives the port for the begin functions. It uses `uart`
  * @return MBM_OK; MBM_INVALID_ARGUMENT for NULL, a rate of 0, no `startSending`, or storage that is
- * too small; MBM_BUSY if the line is open
+ * too small; MBM_BUSY if the line is open; MBM_LINK_LOST if `setDriver` cannot switch the pin off
  */
 uint8_t mbm_freertos_open(mbm_freertosUart *uart, mbm_port *port);
 
