@@ -36,6 +36,11 @@ LWIP_RELAY_TESTS := $(filter test_lwip_task test_lwip_sockets test_porttest_lwip
 LWIP_WIRE_TESTS := $(filter-out $(LWIP_RELAY_TESTS),$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PICO_TESTS := $(filter test_pico test_porttest_pico,$(TESTS))
+# The UARTs of the bare metal port that have registers.
+BARE_UARTS := $(filter-out simcall,$(patsubst ports/baremetal/uart/%.c,%,$(wildcard ports/baremetal/uart/*.c)))
+# The board that plays Zephyr for the module's own tests, and its wire.
+ZEPHYR_TESTS := $(filter test_zephyr%,$(TESTS))
+ZEPHYR_STAND_IN := packaging/zephyr/stand-in
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
@@ -313,6 +318,20 @@ $(PICO_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model 
 $(PICO_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart served_unit mbm_stm32 mbm_stm32_callbacks)
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/stm32 -Iports/stm32
+$(BUILD)/$(1)/zephyr/%.o: $(ZEPHYR_STAND_IN)/%.c
+	@mkdir -p $$(@D)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
+$(BUILD)/$(1)/line/%.o: firmware-tests/line/%.c
+	@mkdir -p $$(@D)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
+$(ZEPHYR_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/%.o,zephyr/mbm_zephyr zephyr/board line/line)
+$(ZEPHYR_TESTS:%=$(BUILD)/$(1)/%): INCLUDES := -Ifirmware-tests/line $(INCLUDES) -Ic-tests/zephyr -Iports/zephyr -I$(ZEPHYR_STAND_IN) -I$(ZEPHYR_STAND_IN)/include \
+	-DSTAND_IN_UART_KIND=CONFIGURABLE -DCONFIG_UART_INTERRUPT_DRIVEN -DCONFIG_UART_USE_RUNTIME_CONFIGURE
+$(BUILD)/$(1)/baremetal/%.o: ports/baremetal/uart/%.c
+	@mkdir -p $$(@D)
+	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -DPREFIX=u_$$* -include c-tests/baremetal/registers.h -c $$< -o $$@
+$(BUILD)/$(1)/test_baremetal: $(patsubst %,$(BUILD)/$(1)/baremetal/%.o,$(BARE_UARTS))
+$(BUILD)/$(1)/test_baremetal: INCLUDES := -Ic-tests/baremetal -Iports/baremetal $(INCLUDES)
 $(BUILD)/$(1)/test_wiznet: $(patsubst %,$(BUILD)/$(1)/wiznet/%.o,chip_model mbm_wiznet)
 $(BUILD)/$(1)/test_wiznet: INCLUDES += -Ic-tests/wiznet -Iports/wiznet
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)

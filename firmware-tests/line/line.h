@@ -53,8 +53,18 @@ uint16_t line_write_as_device(const uint8_t *bytes, uint16_t length);
 /* Ends the program with this message unless the fact is true. */
 void line_expect(bool fact, const char *what);
 
+/* The transmitter stands still, or goes on. What it has stays in it. */
+void line_stop(bool stops);
+
+/* Drops the bytes that have not left. */
+void line_drop_unsent(void);
+
+/* A line as at the program's begin, but for the time and the device. For several tests in one
+ * program. */
+void line_reset(void);
+
 /* Ends the program with success in the first sleep of half a second or more after the device has
  * answered so many requests. */
-void line_end_after(unsigned answers);
+void line_end_after(unsigned wanted);
 
 #endif

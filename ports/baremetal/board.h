@@ -14,11 +14,19 @@
 /* Sets up clocks and pins. Called before all other functions. */
 void machine_start(void);
 
-/* The hooks of mbm_port. There is one UART, so they do not use `context`. */
+/* The hooks of mbm_port. There is one UART, so they do not use `context`. A transmitter that stands
+ * still for half a second is given up: the UART is started again, and the next hook returns a lost
+ * link. */
 void uart_start(void);
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity);
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length);
 uint8_t uart_flush(void *context);
+
+/* Returns how often the UART overran, and with a ring also how many bytes it had no place for. */
+uint16_t uart_lost(void);
+
+/* Returns how often the transmitter was given up. */
+uint16_t uart_stalled(void);
 
 void clock_start(void);
 uint32_t clock_micros(void *context);
@@ -30,7 +38,11 @@ _Noreturn void console_exit(uint8_t code);
 
 int main(void);
 
+/* The tests play the registers. */
+#ifndef REGISTER
 #define REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
+#define REGISTER8(address) (*(volatile uint8_t *)(uintptr_t)(address))
+#endif
 
 /* A free-running counter. clock/counter.c makes microseconds of it. */
 void counter_start(void);
@@ -43,9 +55,6 @@ uint32_t counter_read(void);
 
 /* Returns whether bytes wait in the ring. Called while interrupts are held back. */
 uint8_t uart_has_bytes(void);
-
-/* Returns how many bytes the ring lost because it was full. */
-uint16_t uart_lost(void);
 
 void sleep_start(void);
 

@@ -4,6 +4,7 @@
  * The sample's main runs by itself: this file's constructor prepares the line. The program ends
  * when the device has answered four requests and ignored one. Licence: MIT OR Apache-2.0. */
 #include "line.h"
+#include "zephyr_board.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -17,53 +18,86 @@ enum { CONFIGURABLE, READABLE, FIXED };
 const struct device stand_in_uart = {.name = STAND_IN_UART};
 const struct device stand_in_gpio = {.name = STAND_IN_GPIO};
 
+struct board_faults board_faults;
+unsigned board_interrupts;
 static uart_irq_callback_user_data_t call;
 static void *call_data;
-static bool is_configured = STAND_IN_UART_KIND != CONFIGURABLE;
-static bool is_output, has_rx, has_tx, is_inside, is_updated;
+static const int uart_kind = STAND_IN_UART_KIND;
+static bool is_configured;
+static bool is_output, has_rx, has_tx, is_inside, is_updated, has_begun;
+static unsigned locks;
 
 __attribute__((constructor)) static void begin(void)
 {
     line_ignore_after(2);
     line_end_after(4);
-    if (STAND_IN_UART_KIND != CONFIGURABLE)
+    if (uart_kind != CONFIGURABLE) {
         line_begin(STAND_IN_CURRENT_SPEED);
+        is_configured = true;
+    }
 }
 
 bool device_is_ready(const struct device *device)
 {
-    return device == &stand_in_uart || device == &stand_in_gpio;
+    return (device == &stand_in_uart && !board_faults.uartIsNotReady) ||
+           (device == &stand_in_gpio && !board_faults.gpioIsNotReady);
 }
 
 /* --- the UART */
+
+static bool has_received(void)
+{
+    return has_rx && line_received() > 0 &&
+           !(board_faults.isDeafUntilChecked && board_faults.errors != 0);
+}
+
+static bool can_send(void)
+{
+    return has_tx && line_unsent() < FIFO && !board_faults.hasNoTxInterrupt &&
+           !(board_faults.hasNoLastInterrupt && has_begun && line_unsent() <= 1);
+}
 
 /* The interrupt's level: the handler runs again as long as there is something to do. */
 void line_interrupt(void)
 {
     int times = 0;
 
-    if (call == NULL || is_inside)
+    if (call == NULL || is_inside || locks > 0)
         return;
     is_inside = true;
-    while ((has_rx && line_received() > 0) || (has_tx && (line_unsent() < FIFO && times < 2))) {
+    while (has_received() || (can_send() && times < 2)) {
         line_expect(times++ < 100, "the handler does not end");
         is_updated = false;
+        board_interrupts++;
         call(&stand_in_uart, call_data);
     }
     is_inside = false;
 }
 
+void board_interrupt(void)
+{
+    has_tx = true;
+    line_interrupt();
+}
+
 int uart_configure(const struct device *dev, const struct uart_config *config)
 {
     line_expect(dev == &stand_in_uart && config->baudrate == 19200, "the rate");
-    if (STAND_IN_UART_KIND != CONFIGURABLE)
+    if (uart_kind != CONFIGURABLE)
         return -ENOSYS;
+    if (board_faults.configure != 0)
+        return board_faults.configure;
     line_expect(config->parity == UART_CFG_PARITY_EVEN &&
                     config->stop_bits == UART_CFG_STOP_BITS_1 &&
                     config->data_bits == UART_CFG_DATA_BITS_8 &&
                     config->flow_ctrl == UART_CFG_FLOW_CTRL_NONE,
                 "the format");
-    line_begin(config->baudrate);
+    if (!board_faults.keepsFifo)
+        line_drop_unsent();
+    /* As some drivers do. */
+    has_rx = has_tx = false;
+    if (!is_configured)
+        line_begin(config->baudrate);
     is_configured = true;
     return 0;
 }
@@ -71,7 +105,7 @@ int uart_configure(const struct device *dev, const struct uart_config *config)
 int uart_config_get(const struct device *dev, struct uart_config *config)
 {
     line_expect(dev == &stand_in_uart, "the settings of another UART");
-    if (STAND_IN_UART_KIND == FIXED)
+    if (uart_kind == FIXED)
         return -ENOSYS;
     *config =
         (struct uart_config){STAND_IN_CURRENT_SPEED, UART_CFG_PARITY_NONE, UART_CFG_STOP_BITS_1,
@@ -98,14 +132,14 @@ int uart_irq_rx_ready(const struct device *dev)
 {
     (void)dev;
     line_expect(is_updated, "the state is read without uart_irq_update");
-    return has_rx && line_received() > 0;
+    return has_received();
 }
 
 int uart_irq_tx_ready(const struct device *dev)
 {
     (void)dev;
     line_expect(is_updated, "the state is read without uart_irq_update");
-    return has_tx && line_unsent() < FIFO;
+    return can_send();
 }
 
 int uart_irq_is_pending(const struct device *dev)
@@ -117,7 +151,6 @@ int uart_irq_is_pending(const struct device *dev)
 int uart_irq_tx_complete(const struct device *dev)
 {
     (void)dev;
-    line_expect(is_updated, "the state is read without uart_irq_update");
     return line_unsent() <= 1;
 }
 
@@ -130,6 +163,7 @@ void uart_irq_rx_enable(const struct device *dev)
 void uart_irq_tx_enable(const struct device *dev)
 {
     has_tx = dev == &stand_in_uart;
+    has_begun = false;
     line_interrupt();
 }
 
@@ -152,7 +186,20 @@ int uart_fifo_fill(const struct device *dev, const uint8_t *bytes, int size)
     int space = FIFO - line_unsent();
 
     line_expect(dev == &stand_in_uart && is_inside, "the FIFO is filled outside of the handler");
+    has_begun = true;
     return line_write(bytes, (uint16_t)(size < space ? size : space));
+}
+
+int uart_err_check(const struct device *dev)
+{
+    const int errors = board_faults.errors;
+
+    line_expect(dev == &stand_in_uart, "the errors of another UART");
+    if (board_faults.hasNoErrCheck)
+        return -ENOSYS;
+    if (!board_faults.keepsErrors)
+        board_faults.errors = 0;
+    return errors;
 }
 
 /* --- the GPIO */
@@ -162,6 +209,8 @@ int gpio_pin_configure_dt(const struct gpio_dt_spec *pin, gpio_flags_t flags)
     line_expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN &&
                     flags == GPIO_OUTPUT_INACTIVE,
                 "another GPIO is set up");
+    if (board_faults.pinConfigure != 0)
+        return board_faults.pinConfigure;
     /* A line may be opened again. */
     if (!is_output)
         printf("driver: pin %d of %s\n", pin->pin, pin->port->name);
@@ -174,6 +223,8 @@ int gpio_pin_set_dt(const struct gpio_dt_spec *pin, int value)
 {
     line_expect(pin->port == &stand_in_gpio && pin->pin == STAND_IN_PIN && is_output,
                 "another GPIO is set");
+    if (board_faults.pinSet != 0)
+        return board_faults.pinSet;
     line_drive(value != 0);
     return 0;
 }
@@ -183,6 +234,11 @@ int gpio_pin_set_dt(const struct gpio_dt_spec *pin, int value)
 int64_t k_uptime_ticks(void)
 {
     return line_micros() / STAND_IN_TICK_US;
+}
+
+uint32_t k_uptime_get_32(void)
+{
+    return line_micros() / 1000;
 }
 
 uint32_t k_cycle_get_32(void)
@@ -209,6 +265,24 @@ int32_t k_msleep(int32_t milliseconds)
 {
     line_sleep((uint32_t)milliseconds * 1000);
     return 0;
+}
+
+/* On one core: interrupts wait. */
+k_spinlock_key_t k_spin_lock(struct k_spinlock *lock)
+{
+    line_expect(!lock->isLocked, "a lock is taken twice");
+    lock->isLocked = true;
+    locks++;
+    return (k_spinlock_key_t){0};
+}
+
+void k_spin_unlock(struct k_spinlock *lock, k_spinlock_key_t key)
+{
+    (void)key;
+    line_expect(lock->isLocked, "a lock is given twice");
+    lock->isLocked = false;
+    locks--;
+    line_interrupt();
 }
 
 int k_sem_init(struct k_sem *sem, unsigned count, unsigned limit)

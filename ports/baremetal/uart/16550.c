@@ -1,20 +1,21 @@
 /* The 16550, with registers a byte apart. Licence: MIT OR Apache-2.0. */
 #include "board.h"
+#include "faults.h"
 #include "machine.h"
 
-#define REGISTER8(offset) (*(volatile uint8_t *)(uintptr_t)(UART_BASE + (offset)))
-#define DATA REGISTER8(0u)
-#define DIVISOR_LOW REGISTER8(0u)
-#define DIVISOR_HIGH REGISTER8(1u)
-#define FIFO REGISTER8(2u)
-#define LINE REGISTER8(3u)
-#define STATUS REGISTER8(5u)
+#define DATA REGISTER8(UART_BASE + 0u)
+#define DIVISOR_LOW REGISTER8(UART_BASE + 0u)
+#define DIVISOR_HIGH REGISTER8(UART_BASE + 1u)
+#define FIFO REGISTER8(UART_BASE + 2u)
+#define LINE REGISTER8(UART_BASE + 3u)
+#define STATUS REGISTER8(UART_BASE + 5u)
 
 #define FIFOS_ON 1u
 #define FIFOS_CLEAR 6u
 #define EIGHT_BITS 3u
 #define SET_DIVISOR 0x80u
 #define RX_FULL (1u << 0u)
+#define OVERRUN (1u << 1u)
 #define TX_EMPTY (1u << 5u)
 #define TX_DONE (1u << 6u)
 
@@ -29,12 +30,26 @@ void uart_start(void)
     FIFO = FIFOS_ON | FIFOS_CLEAR;
 }
 
-#define HAS_BYTE ((STATUS & RX_FULL) != 0u)
-#define CAN_SEND ((STATUS & TX_EMPTY) != 0u)
-#include "polled.h"
-
-uint8_t uart_flush(void *context)
+/* Reading the status clears the overrun. */
+static uint8_t status(void)
 {
-    (void)context;
-    return (STATUS & TX_DONE) != 0u;
+    uint8_t now = STATUS;
+
+    if ((now & OVERRUN) != 0u) {
+        overruns++;
+    }
+    return now;
 }
+
+static uint8_t take_byte(uint8_t *byte)
+{
+    if ((status() & RX_FULL) == 0u) {
+        return 0;
+    }
+    *byte = DATA;
+    return 1;
+}
+
+#define CAN_SEND ((status() & TX_EMPTY) != 0u)
+#define IS_DONE ((status() & TX_DONE) != 0u)
+#include "polled.h"

@@ -8,12 +8,15 @@ void uart_start(void)
     CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
 }
 
-#define HAS_BYTE ((FLAGS & RX_EMPTY) == 0u)
-#define CAN_SEND ((FLAGS & TX_FULL) == 0u)
-#include "polled.h"
-
-uint8_t uart_flush(void *context)
+static uint8_t take_byte(uint8_t *byte)
 {
-    (void)context;
-    return (FLAGS & BUSY) == 0u;
+    if ((FLAGS & RX_EMPTY) != 0u) {
+        return 0;
+    }
+    *byte = pl011_take();
+    return 1;
 }
+
+#define CAN_SEND ((FLAGS & TX_FULL) == 0u)
+#define IS_DONE ((FLAGS & BUSY) == 0u)
+#include "polled.h"

@@ -20,9 +20,8 @@
 static uint8_t received[MBM_MAX_FRAME + 1];
 static mbm_ring ring = MBM_INIT;
 
-void uart_start(void)
+static void start_line(void)
 {
-    (void)mbm_ring_begin(&ring, received, sizeof received);
     pl011_set_line();
     FIFO_LEVELS = AN_EIGHTH;
     INTERRUPT_MASK = RX | RX_ALONE;
@@ -30,17 +29,26 @@ void uart_start(void)
     CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
 }
 
+void uart_start(void)
+{
+    (void)mbm_ring_begin(&ring, received, sizeof received);
+    start_line();
+}
+
 void uart_interrupt(void)
 {
     INTERRUPT_CLEAR = RX | RX_ALONE;
     while ((FLAGS & RX_EMPTY) == 0u) {
-        (void)mbm_ring_put(&ring, (uint8_t)DATA);
+        (void)mbm_ring_put(&ring, pl011_take());
     }
 }
 
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     (void)context;
+    if (take_failure() != 0u) {
+        return -1;
+    }
     return (int16_t)mbm_ring_read(&ring, bytes, capacity);
 }
 
@@ -51,7 +59,7 @@ uint8_t uart_has_bytes(void)
 
 uint16_t uart_lost(void)
 {
-    return mbm_ring_lost(&ring);
+    return (uint16_t)(mbm_ring_lost(&ring) + overruns);
 }
 
 int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
@@ -63,11 +71,21 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
         DATA = bytes[count];
         count++;
     }
+    if (stands_still(count) != 0u) {
+        start_line();
+        return -1;
+    }
     return (int16_t)count;
 }
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    return (FLAGS & BUSY) == 0u;
+    if (has_ended((FLAGS & BUSY) == 0u) == 0u) {
+        return 0;
+    }
+    if (has_failed != 0u) {
+        start_line();
+    }
+    return 1;
 }

@@ -1,14 +1,22 @@
-/* The reading and writing of a UART that the main loop polls. Before the include, define
- * DATA, the register of received and sent bytes; HAS_BYTE, whether a byte waits to be
- * read; and CAN_SEND, whether DATA accepts a byte. Licence: MIT OR Apache-2.0. */
+/* The hooks of a UART that the main loop polls. Before the include, define DATA, the register of
+ * sent bytes; take_byte(), which takes a received byte, counts overruns and returns 0 if there is
+ * none; CAN_SEND, whether DATA accepts a byte; and IS_DONE, whether the last bit has left.
+ * Licence: MIT OR Apache-2.0. */
+
+uint16_t uart_lost(void)
+{
+    return overruns;
+}
 
 int16_t uart_read(void *context, uint8_t *bytes, uint16_t capacity)
 {
     uint16_t count = 0;
 
     (void)context;
-    while ((count < capacity) && HAS_BYTE) {
-        bytes[count] = (uint8_t)DATA;
+    if (take_failure() != 0u) {
+        return -1;
+    }
+    while ((count < capacity) && (take_byte(&bytes[count]) != 0u)) {
         count++;
     }
     return (int16_t)count;
@@ -23,5 +31,21 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
         DATA = bytes[count];
         count++;
     }
+    if (stands_still(count) != 0u) {
+        uart_start();
+        return -1;
+    }
     return (int16_t)count;
+}
+
+uint8_t uart_flush(void *context)
+{
+    (void)context;
+    if (has_ended(IS_DONE) == 0u) {
+        return 0;
+    }
+    if (has_failed != 0u) {
+        uart_start();
+    }
+    return 1;
 }

@@ -41,3 +41,14 @@ uint8_t uart_flush(void *context)
     (void)context;
     return 1;
 }
+
+/* The simulator keeps no line back. */
+uint16_t uart_lost(void)
+{
+    return 0;
+}
+
+uint16_t uart_stalled(void)
+{
+    return 0;
+}

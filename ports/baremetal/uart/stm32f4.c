@@ -1,5 +1,6 @@
 /* The USART of STM32 F1, F2 and F4. Licence: MIT OR Apache-2.0. */
 #include "board.h"
+#include "faults.h"
 #include "machine.h"
 
 #define STATUS REGISTER(UART_BASE + 0x00u)
@@ -7,6 +8,7 @@
 #define DIVISOR REGISTER(UART_BASE + 0x08u)
 #define CONTROL REGISTER(UART_BASE + 0x0Cu)
 
+#define OVERRUN (1u << 3u)
 #define RX_FULL (1u << 5u)
 #define TX_DONE (1u << 6u)
 #define TX_EMPTY (1u << 7u)
@@ -21,12 +23,20 @@ void uart_start(void)
     CONTROL = ENABLE | TX_ENABLE | RX_ENABLE;
 }
 
-#define HAS_BYTE ((STATUS & RX_FULL) != 0u)
-#define CAN_SEND ((STATUS & TX_EMPTY) != 0u)
-#include "polled.h"
-
-uint8_t uart_flush(void *context)
+/* Reading the byte clears the overrun, also when the overrun came after the byte was taken. */
+static uint8_t take_byte(uint8_t *byte)
 {
-    (void)context;
-    return (STATUS & TX_DONE) != 0u;
+    uint32_t status = STATUS;
+
+    if ((status & OVERRUN) != 0u) {
+        overruns++;
+    }
+    if ((status & (RX_FULL | OVERRUN)) != 0u) {
+        *byte = (uint8_t)DATA;
+    }
+    return (status & RX_FULL) != 0u;
 }
+
+#define CAN_SEND ((STATUS & TX_EMPTY) != 0u)
+#define IS_DONE ((STATUS & TX_DONE) != 0u)
+#include "polled.h"

@@ -9,6 +9,13 @@ enum uart_config_stop_bits { UART_CFG_STOP_BITS_1 = 1, UART_CFG_STOP_BITS_2 = 3 
 enum uart_config_data_bits { UART_CFG_DATA_BITS_8 = 3 };
 enum uart_config_flow_control { UART_CFG_FLOW_CTRL_NONE };
 
+enum uart_rx_stop_reason {
+    UART_ERROR_OVERRUN = 1,
+    UART_ERROR_PARITY = 2,
+    UART_ERROR_FRAMING = 4,
+    UART_ERROR_NOISE = 32
+};
+
 struct uart_config {
     uint32_t baudrate;
     uint8_t parity;
@@ -21,8 +28,9 @@ typedef void (*uart_irq_callback_user_data_t)(const struct device *dev, void *us
 
 int uart_configure(const struct device *dev, const struct uart_config *config);
 int uart_config_get(const struct device *dev, struct uart_config *config);
+int uart_err_check(const struct device *dev);
 #ifdef CONFIG_UART_INTERRUPT_DRIVEN
-int uart_irq_callback_user_data_set(const struct device *dev, uart_irq_callback_user_data_t call,
+int uart_irq_callback_user_data_set(const struct device *dev, uart_irq_callback_user_data_t wanted,
                                     void *user_data);
 int uart_irq_update(const struct device *dev);
 int uart_irq_is_pending(const struct device *dev);
