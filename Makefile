@@ -248,7 +248,7 @@ fault-table: need-test ## Generate docs/reports/fault-table.md and the table of 
 	@scripts/build/pictures
 
 .PHONY: conformance
-conformance: ## Write docs/reports/conformance.md from conformance.toml: each clause and its tests
+conformance: ## Write the counts and the differences of docs/reports/conformance.md from its tables
 	@scripts/need python3
 	@scripts/check/functions --write
 
@@ -301,7 +301,7 @@ $(BUILD)/$(1)/%.o: examples/%.c
 $(BUILD)/$(1)/cli/%.o: cli/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) $(TOOL_FLAGS) -c $$< -o $$@
-$(BUILD)/$(1)/cli/page.o: cli/page.html
+$(BUILD)/$(1)/cli/live.o: cli/page.html
 $(BUILD)/$(1)/%.o: ports/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
@@ -459,7 +459,7 @@ HARDENED := -O2 -D_FORTIFY_SOURCE=2 -fstack-protector-strong -fPIE
 $(BUILD)/linux/cli/%.o: cli/%.c
 	@mkdir -p $(@D)
 	@gcc $(DEPENDS) -std=c11 $(HARDENED) $(TOOL_FLAGS) -Iinclude -Iports/linux -c $< -o $@
-$(BUILD)/linux/cli/page.o: cli/page.html
+$(BUILD)/linux/cli/live.o: cli/page.html
 $(INSTALLED_TOOL): linux $(TOOL:%.c=$(BUILD)/linux/%.o)
 	@gcc -pie -Wl,-z,relro,-z,now,--as-needed $(filter %.o,$^) $(BUILD)/linux/libmbm-tls.a $(LIBRARY) $(TOOL_LIBS) -o $@
 
