@@ -4,15 +4,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
 
-#include "device_address.h"
-#include "device_home.h"
-#include "device_initial.h"
-#include "device_labels.h"
-#include "device_limits.h"
-#include "device_names.h"
-#include "device_repeat.h"
-#include "device_types.h"
-#include "device_values.h"
+#include "device_keys.h"
 #include "report.h"
 
 #include <errno.h>

@@ -1,9 +1,8 @@
 /* Reads the keys of a field for Home Assistant, and refuses what Home Assistant would refuse.
  *
  * Licence: MIT OR Apache-2.0. */
-#include "device_home.h"
+#include "device_keys.h"
 
-#include "device_initial.h"
 #include "home.h"
 #include "numbers.h"
 

@@ -1,9 +1,7 @@
 /* Reads the limits of a device, and checks its fields against them.
  *
  * Licence: MIT OR Apache-2.0. */
-#include "device_limits.h"
-
-#include "device_address.h"
+#include "device_keys.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Reads what completes the type of a field, and refuses what does not go with it.
  *
  * Licence: MIT OR Apache-2.0. */
-#include "device_types.h"
+#include "device_keys.h"
 
 #include "numbers.h"
 #include "value_dates.h"

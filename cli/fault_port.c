@@ -1,16 +1,115 @@
-/* Sends the answers of a server with their faults.
+/* Refuses and drops requests as devices of the field do, and sends answers with their faults.
  *
  * Licence: MIT OR Apache-2.0. */
 #include "fault_port.h"
 
 #include "clock.h"
-#include "fault_frame.h"
 #include "port_over.h"
 
 #include <string.h>
 
 /* PAUSE: longer than t3.5 of any rate from 9600 baud on, in microseconds. */
 enum { PAUSE = 5000 };
+
+/* --- frames, taken apart so that a fault can change them --- */
+
+/* The bytes before the unit on Modbus TCP: transaction number, protocol identifier, length. */
+enum { FRAME_HEADER = 6, FRAME_BYTES = MBM_MAX_ASCII_FRAME + 4 };
+
+/* The body of a frame is its unit and PDU. `header` is that of Modbus TCP. */
+typedef struct frame_parts {
+    uint8_t header[FRAME_HEADER];
+    uint8_t body[MBM_MAX_PDU + 2];
+    uint16_t length; /* of the body */
+} frame_parts;
+
+static uint8_t digit(uint8_t character)
+{
+    return (uint8_t)(character <= '9' ? character - '0' : character - 'A' + 10);
+}
+
+/* Takes apart a frame that the server has built. `framing` is one of MBM_FRAMING_. */
+static void take_apart(uint8_t framing, const uint8_t *frame, uint16_t length, frame_parts *of)
+{
+    const uint8_t *body = frame;
+    uint16_t i;
+
+    of->length = (uint16_t)(length - 2);
+    if (framing == MBM_FRAMING_TCP) {
+        memcpy(of->header, frame, FRAME_HEADER);
+        of->length = (uint16_t)(length - FRAME_HEADER);
+        body += FRAME_HEADER;
+    } else if (framing == MBM_FRAMING_ASCII) {
+        of->length = (uint16_t)((length - 5) / 2);
+    }
+    if (of->length > MBM_MAX_PDU + 1)
+        of->length = MBM_MAX_PDU + 1;
+    for (i = 0; i < of->length; i++)
+        of->body[i] = framing != MBM_FRAMING_ASCII
+                          ? body[i]
+                          : (uint8_t)(digit(frame[1 + 2 * i]) << 4 | digit(frame[2 + 2 * i]));
+}
+
+/* Puts a frame together, in FRAME_BYTES. Returns its length. */
+static uint16_t put_together(uint8_t framing, const frame_parts *of, uint8_t *frame)
+{
+    const uint16_t length = of->length;
+    uint16_t crc, i, at = 0;
+
+    switch (framing) {
+    case MBM_FRAMING_TCP:
+        memcpy(frame, of->header, FRAME_HEADER);
+        memcpy(frame + FRAME_HEADER, of->body, length);
+        return (uint16_t)(FRAME_HEADER + length);
+    case MBM_FRAMING_ASCII:
+        frame[at++] = ':';
+        for (i = 0; i <= length; i++) {
+            const uint8_t byte = i < length ? of->body[i] : mbm_frame_lrc(of->body, length);
+
+            frame[at++] = (uint8_t) "0123456789ABCDEF"[byte >> 4];
+            frame[at++] = (uint8_t) "0123456789ABCDEF"[byte & 15];
+        }
+        frame[at++] = '\r';
+        frame[at++] = '\n';
+        return at;
+    default:
+        memcpy(frame, of->body, length);
+        crc = mbm_frame_crc16(of->body, length);
+        frame[length] = (uint8_t)crc;
+        frame[length + 1] = (uint8_t)(crc >> 8);
+        return (uint16_t)(length + 2);
+    }
+}
+
+/* Damages CRC, LRC or the protocol identifier. */
+static void damage(uint8_t framing, uint8_t *frame, uint16_t length)
+{
+    uint8_t *lrc = &frame[length - 3];
+
+    if (framing == MBM_FRAMING_TCP)
+        frame[2] ^= 0xFF;
+    else if (framing == MBM_FRAMING_ASCII)
+        *lrc = *lrc == '0' ? '1' : '0';
+    else
+        frame[length - 1] ^= 0xFF;
+}
+
+/* Makes the length or the byte count in the frame wrong. */
+static void lengthen(uint8_t framing, frame_parts *of)
+{
+    static const uint8_t COUNTED[] = {1, 2, 3, 4, 12, 17, 20, 21, 23};
+
+    if (framing == MBM_FRAMING_TCP) {
+        if (++of->header[5] == 0)
+            of->header[4]++;
+    } else if (memchr(COUNTED, of->body[1], sizeof COUNTED)) {
+        of->body[2]++;
+    } else {
+        of->body[of->length++] = 0;
+    }
+}
+
+/* --- faults --- */
 
 static int64_t now_us(void)
 {
@@ -62,7 +161,7 @@ static void add_piece(fault_port *port, uint32_t pause, const uint8_t *bytes, ui
 }
 
 /* Gives an answer the unit and the number of a device that has others. */
-static void name_answer(fault_port *port, fault_frame *of)
+static void name_answer(fault_port *port, frame_parts *of)
 {
     uint32_t number = value(port, FAULT_TRANSACTION);
 
@@ -81,11 +180,11 @@ static void name_answer(fault_port *port, fault_frame *of)
 /* Makes the pieces of an answer with the faults that were chosen. */
 static void make_pieces(fault_port *port, const uint8_t *answer, uint16_t length)
 {
-    uint8_t frame[FAULT_FRAME_BYTES], noise[256];
-    fault_frame of = {0}, foreign;
+    uint8_t frame[FRAME_BYTES], noise[256];
+    frame_parts of = {0}, foreign;
     uint16_t count, number;
 
-    fault_frame_take_apart(port->framing, answer, length, &of);
+    take_apart(port->framing, answer, length, &of);
     number = (uint16_t)(of.header[0] << 8 | of.header[1]);
     name_answer(port, &of);
     port->transaction = number;
@@ -97,14 +196,14 @@ static void make_pieces(fault_port *port, const uint8_t *answer, uint16_t length
     if (has(port, FAULT_FOREIGN)) {
         foreign = of;
         foreign.body[0] = (uint8_t)(foreign.body[0] >= 247 ? 1 : foreign.body[0] + 1);
-        count = fault_frame_put_together(port->framing, &foreign, frame);
+        count = put_together(port->framing, &foreign, frame);
         add_piece(port, 0, frame, count);
     }
     if (has(port, FAULT_WRONG_LENGTH))
-        fault_frame_lengthen(port->framing, &of);
-    count = fault_frame_put_together(port->framing, &of, frame);
+        lengthen(port->framing, &of);
+    count = put_together(port->framing, &of, frame);
     if (has(port, FAULT_DAMAGED))
-        fault_frame_damage(port->framing, frame, count);
+        damage(port->framing, frame, count);
     if (has(port, FAULT_CUT) && value(port, FAULT_CUT) < count)
         count = (uint16_t)value(port, FAULT_CUT);
     add_piece(port, has(port, FAULT_FOREIGN) ? PAUSE : 0, frame, count);
@@ -124,8 +223,8 @@ static void lose(fault_port *port)
 static void refuse(fault_port *port)
 {
     const fault_walk *walk = &port->walk;
-    uint8_t frame[FAULT_FRAME_BYTES];
-    fault_frame of = {.header = {walk->head[0], walk->head[1], 0, 0, 0, 3},
+    uint8_t frame[FRAME_BYTES];
+    frame_parts of = {.header = {walk->head[0], walk->head[1], 0, 0, 0, 3},
                       .body = {walk->head[6], walk->head[7] | 0x80, MBM_SERVER_DEVICE_BUSY},
                       .length = 3};
     uint16_t length;
@@ -133,7 +232,7 @@ static void refuse(fault_port *port)
     if (!lasting(port, FAULT_BUSY) || walk->have < sizeof walk->head)
         return;
     name_answer(port, &of);
-    length = fault_frame_put_together(port->framing, &of, frame);
+    length = put_together(port->framing, &of, frame);
     if (port->refused + length > sizeof port->refusals)
         return;
     memcpy(port->refusals + port->refused, frame, length);
@@ -157,13 +256,13 @@ static uint16_t pass(fault_port *port, uint8_t *bytes, uint16_t count, int drops
             walk->head[walk->have] = byte;
         if (walk->have < UINT16_MAX)
             walk->have++;
-        if (walk->have == FAULT_FRAME_HEADER)
+        if (walk->have == FRAME_HEADER)
             walk->left = (uint16_t)(walk->head[4] << 8 | walk->head[5]);
-        else if (walk->have > FAULT_FRAME_HEADER)
+        else if (walk->have > FRAME_HEADER)
             walk->left--;
         if (!walk->drops)
             bytes[passed++] = byte;
-        if (walk->have < FAULT_FRAME_HEADER || walk->left > 0)
+        if (walk->have < FRAME_HEADER || walk->left > 0)
             continue;
         if (walk->drops)
             refuse(port);
@@ -383,4 +482,136 @@ uint32_t fault_port_delay(fault_port *port)
     passed = port->below.micros(port->below.context) - port->sinceUs;
     /* The port below accepts no bytes now. */
     return passed < port->pauseUs ? port->pauseUs - passed : 1000;
+}
+
+/* --- what the device makes of a request --- */
+
+/* Addresses that a request reads or writes. */
+typedef struct touched {
+    uint16_t address, quantity;
+    uint8_t is_bits;
+} touched;
+
+static uint16_t word_at(const mbm_request *request, uint16_t at)
+{
+    return at + 2 <= request->length ? (uint16_t)(request->data[at] << 8 | request->data[at + 1])
+                                     : 0;
+}
+
+/* Finds the blocks of a request, at most two. Returns how many there are. */
+static int find_blocks(const mbm_request *request, touched blocks[2])
+{
+    const uint16_t first = word_at(request, 0), second = word_at(request, 2);
+
+    switch (request->function) {
+    case 1:
+    case 2:
+    case 15: blocks[0] = (touched){first, second, 1}; return 1;
+    case 3:
+    case 4:
+    case 16: blocks[0] = (touched){first, second, 0}; return 1;
+    case 5: blocks[0] = (touched){first, 1, 1}; return 1;
+    case 6:
+    case 22: blocks[0] = (touched){first, 1, 0}; return 1;
+    case 23:
+        blocks[0] = (touched){first, second, 0};
+        blocks[1] = (touched){word_at(request, 4), word_at(request, 6), 0};
+        return 2;
+    default: return 0;
+    }
+}
+
+/* Whether a fault of the device refuses a block. */
+static int refuses_block(const fault *one, const touched *of)
+{
+    switch (one->kind) {
+    case FAULT_MOST_REGISTERS: return !of->is_bits && of->quantity > one->value;
+    case FAULT_MOST_BITS: return of->is_bits && of->quantity > one->value;
+    case FAULT_HOLE:
+        return of->address <= one->last && (uint32_t)of->address + of->quantity > one->value;
+    default: return 0;
+    }
+}
+
+/* Returns the exception of a request for a function that the device does not have, or for a block
+ * that it refuses; else 0. */
+static uint8_t refusal_of(const fault_device *device, const fault_choice *chosen,
+                          const mbm_request *request)
+{
+    const fault_list *list = &device->list;
+    int is_missing = 0, is_allowed = !chosen->has[FAULT_ONLY_FUNCTION], is_refused = 0, j;
+    touched blocks[2];
+    const int count = find_blocks(request, blocks);
+    uint32_t i;
+
+    for (i = 0; i < list->count; i++) {
+        const fault *one = &list->faults[i];
+        const int is_of_function = one->value == request->function;
+
+        if (!fault_is_due(list, one))
+            continue;
+        is_allowed |= one->kind == FAULT_ONLY_FUNCTION && is_of_function;
+        is_missing |= one->kind == FAULT_NO_FUNCTION && is_of_function;
+        for (j = 0; j < count; j++)
+            is_refused |= refuses_block(one, &blocks[j]);
+    }
+    if (is_missing || !is_allowed)
+        return MBM_ILLEGAL_FUNCTION;
+    if (is_refused)
+        return chosen->has[FAULT_REFUSED_WITH] ? (uint8_t)chosen->value[FAULT_REFUSED_WITH]
+                                               : MBM_ILLEGAL_DATA_ADDRESS;
+    return 0;
+}
+
+/* Whether the request came too early: after the connection was made, or after the last bytes. */
+static int is_early(const fault_device *device, const fault_port *port, int64_t began)
+{
+    const int64_t delay = (int64_t)port->chosen.value[FAULT_NEEDS_DELAY] * 1000,
+                  wait = (int64_t)port->chosen.value[FAULT_NEEDS_MESSAGE_WAIT] * 1000;
+
+    return (delay && began - port->openedUs < delay) || (wait && began - device->quietUs < wait);
+}
+
+static int is_answering_another(const fault_device *device, const fault_port *port)
+{
+    return device->answering && device->answering != port &&
+           fault_port_is_waiting(device->answering) &&
+           fault_value(&device->list, FAULT_ONE_REQUEST);
+}
+
+/* Whether a fault was chosen that changes any answer: those up to FAULT_TRANSACTION do. */
+static int is_hit(const fault_choice *chosen)
+{
+    int kind;
+
+    for (kind = FAULT_LATE; kind <= FAULT_TRANSACTION; kind++)
+        if (chosen->has[kind])
+            return 1;
+    return 0;
+}
+
+uint8_t fault_device_take(fault_device *device, const mbm_request *request)
+{
+    fault_port *port = (fault_port *)request->connection;
+    const int64_t now = (int64_t)clock_micros(CLOCK_MONOTONIC);
+    const int64_t began = port->beganUs ? port->beganUs : port->activeUs;
+    const uint32_t deaf_after = fault_value(&device->list, FAULT_DEAF_AFTER);
+    const int is_deaf = deaf_after && port->answers >= deaf_after;
+    uint8_t exception;
+    int drops;
+
+    device->list.requests++;
+    fault_choose(&device->list, &port->chosen);
+    drops = is_deaf || is_early(device, port, began) || is_answering_another(device, port);
+    port->beganUs = 0;
+    device->quietUs = now;
+    exception = (uint8_t)port->chosen.value[FAULT_EXCEPTION];
+    if (drops) {
+        exception = MBM_SERVER_DEVICE_BUSY;
+        port->chosen.has[FAULT_DEAF] |= is_deaf || !fault_value(&device->list, FAULT_BUSY);
+    } else if (exception == 0) {
+        exception = refusal_of(device, &port->chosen, request);
+    }
+    device->list.hit += drops || exception || is_hit(&port->chosen);
+    return exception;
 }

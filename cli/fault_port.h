@@ -65,4 +65,8 @@ int fault_port_is_waiting(const fault_port *port);
  * to be sent or closed. */
 uint32_t fault_port_delay(fault_port *port);
 
+/* Counts a request, and chooses the faults of its answer for the port that it came from. Returns
+ * the exception that answers it, with which it is not carried out, or 0. */
+uint8_t fault_device_take(fault_device *device, const mbm_request *request);
+
 #endif

@@ -6,7 +6,10 @@
  *
  * Licence: MIT OR Apache-2.0. */
 #include "port_over.h"
-#include "gateway_line.h"
+#include "advice.h"
+#include "clock.h"
+#include "gateway_file.h"
+#include "line.h"
 #include "options.h"
 #include "report.h"
 #include "service.h"
@@ -33,6 +36,17 @@ typedef struct sleep_waits {
     nfds_t clients, count;
 } sleep_waits;
 
+/* A line of the gateway: a place for a serial line, or for a device or gateway on TCP. It need not
+ * be there when the gateway begins. */
+typedef struct gateway_line {
+    line at;
+    char *text;
+    mbm_counters known; /* the counters at the last good reply */
+    uint32_t in_flight;
+    uint8_t is_used;   /* 0: a place for a line, which refuses every request */
+    uint8_t is_silent; /* and that was reported */
+} gateway_line;
+
 /* All storage is the program's own; mbm allocates nothing. */
 typedef struct gateway {
     gateway_line lines[GATEWAY_LINES];
@@ -57,6 +71,121 @@ typedef struct gateway {
     uint8_t place_of[GATEWAY_LINES]; /* the index in `lines` of each line of the setup */
     int is_quiet, is_check;
 } gateway;
+
+/* --- a line --- */
+
+/* The gateway reports a line after SILENT_AFTER requests in a row without a right reply. */
+enum { SILENT_AFTER = 5 };
+
+/* Sets what a reload may change of a line. */
+static void gateway_line_set(gateway_line *l, const gateway_pace *pace, const reach *what)
+{
+    line_set(&l->at, (uint8_t)pace->in_flight, (uint8_t)pace->replace_after);
+    l->in_flight = l->at.place.framing == MBM_FRAMING_TCP ? pace->in_flight : 1;
+    (void)mbm_client_setQuietTime(&l->at.client, pace->quietMs);
+    line_reach(&l->at, what);
+    (void)mbm_link_setConnectTimeout(&l->at.kept, reach_timeout(&l->at.place.reach));
+}
+
+/* Begins the client and the link, which opens the line in the first poll of the client. The text of
+ * the place is copied. Returns 0 without memory. */
+static int gateway_line_begin(gateway_line *l, const place *where, const gateway_pace *pace)
+{
+    char *text = strdup(where->text);
+    place copy = *where;
+
+    if (!text)
+        return 0;
+    copy.text = text;
+    memset(l, 0, sizeof *l);
+    if (line_begin(&l->at, &copy) != CODE_DONE) {
+        free(text);
+        return 0;
+    }
+    l->text = text;
+    l->at.is_logged = l->is_used = 1;
+    gateway_line_set(l, pace, &where->reach);
+    return 1;
+}
+
+/* --- a place without a line --- */
+
+static int16_t no_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    (void)context;
+    (void)bytes;
+    (void)capacity;
+    return -1;
+}
+
+static int16_t no_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    (void)context;
+    (void)bytes;
+    (void)length;
+    return -1;
+}
+
+static uint32_t no_micros(void *context)
+{
+    (void)context;
+    return (uint32_t)clock_micros(CLOCK_MONOTONIC);
+}
+
+/* Makes a zeroed or closed line a place that refuses every request: requests that it had end. */
+static void gateway_line_leave(gateway_line *l)
+{
+    const mbm_port nowhere = {.read = no_read, .write = no_write, .micros = no_micros};
+
+    (void)mbm_client_beginRtuOverTcp(&l->at.client, &nowhere, l->at.incoming,
+                                     sizeof l->at.incoming);
+}
+
+/* Reports devices that have become silent or damaged, and that answer again. */
+static void gateway_line_watch(gateway_line *l)
+{
+    const char *why;
+    const mbm_counters *now = &l->at.counters;
+    const uint32_t damaged = now->badCrc - l->known.badCrc,
+                   failed = damaged + now->timeouts - l->known.timeouts;
+
+    if (now->replies != l->known.replies) {
+        if (l->is_silent)
+            report_log(REPORT_INFO, "%s: a device answers again", l->at.place.text);
+        l->is_silent = 0;
+        l->known = *now;
+    } else if (!l->is_silent && failed >= SILENT_AFTER) {
+        l->is_silent = 1;
+        why = received_text(&l->at.received);
+        report_set_in_flight(l->in_flight);
+        if (damaged > 0)
+            report_log(REPORT_WARNING,
+                       "%s: the last %u requests got no right reply, %u of them damaged ones. %s",
+                       l->at.place.text, failed, damaged, advice_damaged(&l->at.place));
+        else
+            report_log(REPORT_WARNING, "%s: the last %u requests got no reply%s%s. %s%s",
+                       l->at.place.text, failed, why ? ": " : "", why ? why : "",
+                       advice_silent(&l->at.place), report_in_flight());
+    }
+}
+
+/* `isReady` of mbm_gatewayLine. */
+static uint8_t gateway_line_isReady(void *context)
+{
+    gateway_line *l = (gateway_line *)context;
+
+    return (uint8_t)(l->is_used && line_prepare(&l->at));
+}
+
+/* Closes the line, which may be begun again. */
+static void gateway_line_close(gateway_line *l)
+{
+    l->is_used = 0;
+    line_close(&l->at);
+    free(l->text);
+    l->text = NULL;
+    gateway_line_leave(l);
+}
 
 /* --- lines and routes --- */
 

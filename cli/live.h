@@ -5,8 +5,39 @@
 #ifndef LIVE_H
 #define LIVE_H
 
-#include "page.h"
-#include "watch.h"
+#include "http.h"
+#include "polled.h"
+
+/* --- the table, in watch.c --- */
+
+typedef struct watch {
+    followed *of;
+    uint32_t round;                /* of the last values; the program sets it */
+    char time[16];                 /* when that was */
+    char page[128];                /* the address of the page; empty: there is none */
+    uint16_t top;                  /* the first field that is shown */
+    int value_width, number_width; /* the widest so far, so that columns stay in their places */
+} watch;
+
+/* Takes the keys that were pressed. Returns whether the table is to be drawn, or -1 if the user
+ * ends it. */
+int watch_keys(watch *w);
+
+/* Draws the table. */
+void watch_draw(watch *w);
+
+/* Prints all of it, for a terminal that keeps it. */
+void watch_print(watch *w);
+
+/* --- the page, cli/page.html, and the values in JSON --- */
+
+typedef struct page {
+    followed *of;
+    uint32_t round, intervalMs; /* of the last values; the program sets them */
+    http http;
+} page;
+
+/* --- both --- */
 
 typedef struct live {
     /* What the command line says. */

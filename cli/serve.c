@@ -4,7 +4,7 @@
  * Licence: MIT OR Apache-2.0. */
 #include "device_file.h"
 #include "device_plan.h"
-#include "fault_device.h"
+#include "fault_port.h"
 #include "line.h"
 #include "numbers.h"
 #include "options.h"

@@ -1,7 +1,7 @@
 /* Draws the values of polled fields as a table that stays in its place.
  *
  * Licence: MIT OR Apache-2.0. */
-#include "watch.h"
+#include "live.h"
 
 #include "clock.h"
 #include "report.h"

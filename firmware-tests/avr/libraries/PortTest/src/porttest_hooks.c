@@ -1,2 +1,0 @@
-/* A source of the test kit for ports. */
-#include "../../../../../ports/test/mbm_porttest_hooks.c"
