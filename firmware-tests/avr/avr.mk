@@ -125,7 +125,7 @@ $(BARE): firmware-tests/avr/bare/bare.c $(BUILD)/assembler/mbm_avrxmega3.S $(wil
 
 # --- the programs that run the sketches
 
-AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus peer sketch server pty tcp_server)
+AVR_SUPPORT := $(patsubst %,$(BUILD)/avr-tests/%.o,board bus sketch server pty tcp_server)
 AVR_TESTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%,$(wildcard firmware-tests/avr/test_*.c))
 AVR_FLAGS = -std=c11 -O2 -g $(TEST_WARNINGS) -Ifirmware-tests/avr -Ic-tests/support -Iinclude -isystem /usr/include/simavr $(MODBUS)
 
@@ -136,8 +136,7 @@ $(BUILD)/avr-tests/%.o: c-tests/support/%.c
 	@mkdir -p $(@D)
 	@gcc $(DEPENDS) $(AVR_FLAGS) -c $< -o $@
 TIMING := $(BUILD)/avr-tests/timing
-TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c)) \
-                $(BUILD)/avr-tests/rows.o
+TIMING_PARTS := $(patsubst firmware-tests/avr/%.c,$(BUILD)/avr-tests/%.o,$(wildcard firmware-tests/avr/timing_*.c))
 $(TIMING): $(TIMING_PARTS)
 $(AVR_TESTS): $(BUILD)/avr-tests/test.o
 $(AVR_TESTS) $(TIMING): %: %.o $(AVR_SUPPORT)

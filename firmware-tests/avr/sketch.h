@@ -1,5 +1,5 @@
-/* The boards that sketches are compiled for, and what tests observe of a sketch: the text that it
- * prints, and how often it switches a pin. */
+/* The boards that sketches are compiled for, the devices at their wires, and what tests observe of
+ * a sketch: the text that it prints, and how often it switches a pin. */
 #ifndef SKETCH_H
 #define SKETCH_H
 
@@ -48,5 +48,20 @@ void measure_rhythm(void *context, int level, uint64_t cycle);
 
 /* Sets two input registers of a server to a float, high word first. */
 void set_input_float(server *s, unsigned address, float value);
+
+/* --- the devices that a sketch sends requests to --- */
+
+/* A device for board_uart and board_pins. Its context is a server. Simulated time stands
+ * still until the server has answered, so that a busy host changes nothing. */
+void peer_libmodbus(wire *w, const uint8_t *frame, size_t length);
+
+/* Writes the reply of a device to functions 03, 06 and 10. Each of its registers has a
+ * value of its own. Returns the reply's length. */
+size_t peer_right_reply(uint8_t *reply, const uint8_t *request);
+uint16_t peer_value(unsigned address);
+
+/* A device without a context: answers every request with the right reply after one
+ * millisecond. */
+void peer_right(wire *w, const uint8_t *frame, size_t length);
 
 #endif

@@ -4,7 +4,6 @@
 #include "bus.h"
 #include "crc.h"
 #include "sketch.h"
-#include "peer.h"
 #include "test.h"
 
 enum { UNIT = 17, SLAVE = 1 };

@@ -1,6 +1,5 @@
 /* The examples of the client's and the sniffer's classes, compiled as the IDE would, on
  * simulated boards against real libmodbus servers. */
-#include "peer.h"
 #include "sketch.h"
 #include "test.h"
 

@@ -1,7 +1,7 @@
 /* Five reads by a sketch on a simulated Uno. The first meets a fault: a bad wire, an absent
  * device, or a device that answers with exceptions. */
 #include "crc.h"
-#include "peer.h"
+#include "sketch.h"
 #include "test.h"
 
 #include "mbm.h"

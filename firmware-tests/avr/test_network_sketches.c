@@ -3,7 +3,6 @@
  * to the sockets of a real libmodbus. */
 #define _GNU_SOURCE
 #include "sketch.h"
-#include "peer.h"
 #include "tcp_server.h"
 #include "test.h"
 

@@ -1,8 +1,8 @@
 /* A master whose requests are answered at once: its dead time, its stack, its polls. */
-#include "peer.h"
-#include "rows.h"
+#include "sketch.h"
 #include "timing.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* The dead time depends on where a reply comes in the loop that waits for it, and on when the timer
@@ -298,4 +298,165 @@ void time_master(const char *peer)
     polls();
     waits();
     compare_with(peer, &ours);
+}
+
+/* --- the gap while no baud rate is set: t3.5 of the rate of the UART --- */
+
+/* The calls of the sketch, in order. */
+enum { AFTER_BEGIN, OTHER_AFTER_PAUSE, OTHER_AT_ONCE, SAME_AFTER_PAUSE, CALLS };
+
+/* 1750 us; the core's clock counts in steps of 4 us. */
+enum { GAP = 1750 * MHZ, CLOCK_STEP = 4 * MHZ };
+
+typedef struct turns {
+    wire *bus;
+    uint64_t called, silent_from;
+    uint64_t waited[CALLS];  /* from the call to the first byte of its request */
+    uint64_t silence[CALLS]; /* the silence on the line before it */
+} turns;
+
+static void is_called(void *context, int level, uint64_t cycle)
+{
+    turns *t = context;
+
+    if (level)
+        t->called = cycle;
+}
+
+static void is_asked(wire *w, const uint8_t *frame, size_t length)
+{
+    turns *t = w->context;
+    unsigned call = w->frames - 1;
+
+    if (call >= CALLS)
+        give_up("TimeFirst sends more requests than it makes calls");
+    t->waited[call] = w->first_started - t->called;
+    t->silence[call] = w->first_started - w->received;
+    peer_right(w, frame, length);
+}
+
+static void row_of(const char *what, uint64_t cycles, unsigned long limit)
+{
+    row(what, "cycles", (unsigned long)cycles, (unsigned long)cycles, limit);
+}
+
+void time_default_gap(void)
+{
+    turns t = {0};
+    board *b = timed_board("uno", "TimeFirst");
+
+    t.bus = board_uart(b, '0', is_asked, &t);
+    board_watch_pin(b, 'B', 0, is_called, &t);
+    if (!board_run(b, 300 * MS))
+        give_up("a sketch crashed");
+    if (t.bus->frames != CALLS)
+        give_up("TimeFirst has not sent its requests");
+    if (t.silence[OTHER_AT_ONCE] < GAP - CLOCK_STEP)
+        give_up("another object's request does not keep the gap");
+    row_of(
+        "no baud rate set: the first request after begin on a line that was silent for 50 ms, from the call to its first byte",
+        t.waited[AFTER_BEGIN], 3463);
+    row_of(
+        "no baud rate set: another object's request after 50 ms of silence, from the call to its "
+        "first byte",
+        t.waited[OTHER_AFTER_PAUSE], 3463);
+    row_of(
+        "no baud rate set: the same object's request after 50 ms of silence, from the call to its "
+        "first byte",
+        t.waited[SAME_AFTER_PAUSE], 3463);
+    row_of(
+        "no baud rate set: another object's request at once, dead time with the gap of 28000 cycles",
+        t.silence[OTHER_AT_ONCE], GAP + GAP / 20);
+    board_free(b);
+}
+
+/* --- sketches for the library ModbusMaster, unchanged: the time of a transaction, and the RAM ---
+ */
+
+/* A sketch, its far end, and how many transactions are counted: whole rounds of its loop. */
+typedef struct unchanged {
+    const char *name, *what;
+    int unit; /* of the server; 0: the device of the other rows */
+    unsigned transactions;
+} unchanged;
+
+static const unchanged sketches[] = {
+    {"TimeUnchanged", "FC03 of 10 registers, 115200 baud", 0, 60},
+    {"Basic", "Basic, 19200 baud", 2, 60},
+    {"PhoenixContact", "PhoenixContact, 19200 baud", 1, 60},
+    {"TimeLong", "FC03 of 60 registers, 115200 baud", 0, 60},
+};
+
+typedef struct measured {
+    uint64_t time;     /* of all transactions, cycles */
+    unsigned long ram; /* above a sketch that only uses the serial port */
+} measured;
+
+/* The most RAM that a board has used since its stack was painted, variables and stack. */
+static unsigned long ram_used(board *b)
+{
+    return board_symbol(b, "_end") + board_stack_depth(b);
+}
+
+/* Runs a sketch until it has begun `frames` more requests. Returns the time of the last one. */
+static uint64_t run_until_request(board *b, wire *bus, unsigned frames)
+{
+    frames += bus->frames;
+    while (bus->frames < frames)
+        if (!board_run(b, MS))
+            give_up("a sketch crashed");
+    return bus->first_started;
+}
+
+static measured measure(const char *folder, const unchanged *u)
+{
+    board *b = timed_board(folder, u->name), *plain = timed_board("uno", "SizeSerial");
+    measured m;
+    server s;
+    wire *bus;
+    uint64_t began;
+
+    board_paint(b);
+    board_paint(plain);
+    if (u->unit) {
+        server_start(&s, u->unit);
+        /* As the device does that the sketch PhoenixContact is for. */
+        s.mapping->nb_registers = 65;
+        bus = board_uart(b, '0', peer_libmodbus, &s);
+    } else {
+        bus = board_uart(b, '0', peer_right, NULL);
+    }
+    began = run_until_request(b, bus, 1);
+    m.time = run_until_request(b, bus, u->transactions) - began;
+    if (!board_run(plain, MS))
+        give_up("a sketch crashed");
+    m.ram = ram_used(b) - ram_used(plain);
+    if (u->unit)
+        server_stop(&s);
+    board_free(b);
+    board_free(plain);
+    return m;
+}
+
+void time_unchanged(const char *peer)
+{
+    enum { KINDS = sizeof sketches / sizeof sketches[0] };
+    measured ours[KINDS], theirs[KINDS] = {{0}};
+    char what[100];
+    unsigned i;
+
+    for (i = 0; i < KINDS; i++) {
+        ours[i] = measure("uno", &sketches[i]);
+        if (peer)
+            theirs[i] = measure(peer, &sketches[i]);
+    }
+    for (i = 0; i < KINDS; i++) {
+        snprintf(what, sizeof what, "a transaction of an unchanged sketch, %s", sketches[i].what);
+        row_beside_time(what, ours[i].time / sketches[i].transactions,
+                        peer ? theirs[i].time / sketches[i].transactions : 0);
+    }
+    for (i = 0; i < KINDS; i++) {
+        snprintf(what, sizeof what, "RAM at most, stack included, %s", sketches[i].what);
+        row_beside_bytes(what, ours[i].ram, peer ? &theirs[i].ram : NULL);
+    }
 }

@@ -1,7 +1,6 @@
 /* A master that waits for a reply while other bytes arrive without silence. */
 #include "crc.h"
 #include "mbm.h"
-#include "rows.h"
 #include "timing.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
 #include "upstream_device.h"
 
 #include "crc.h"
-#include "peer.h"
+#include "sketch.h"
 #include "test.h"
 
 enum { EVERYTHING = 30000 };

@@ -24,8 +24,20 @@ typedef struct device {
     pthread_t thread;
 } device;
 
-/* Starts the device. With `fault` NULL the line is good. */
-void device_start(device *d, unsigned faulty, device_fault fault);
+/* Starts the device. With `spoil` NULL the line is good. */
+void device_start(device *d, unsigned faulty, device_fault spoil);
 void device_stop(device *d);
+
+/* What a bad wire makes of the reply to a read of ten registers. */
+typedef struct fault {
+    const char *name;
+    device_fault spoil;
+    uint8_t status;            /* of the request that meets the fault */
+    uint8_t resynchronisation; /* 1: the reply is found after bytes that are no frame */
+    uint8_t foreign;           /* 1: a frame of another unit or function comes first */
+} fault;
+
+extern const fault faults[];
+extern const unsigned fault_count;
 
 #endif

@@ -7,13 +7,13 @@ VARIANTS = $(shell $(MAKE) -s --no-print-directory -f $(BAREMETAL) variants)
 
 # The test kit for ports runs from the archives alone.
 PORT_QEMU_TEST := $(BUILD)/firmware/test_porttest
-# These need no archive, so they run once.
-RUST_QEMU_TESTS := $(BUILD)/firmware/test_rust $(BUILD)/firmware/test_embassy
-QEMU_TESTS := $(filter-out $(RUST_QEMU_TESTS),$(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c)))
+# This needs no archive, so it runs once.
+RUST_QEMU_TEST := $(BUILD)/firmware/test_rust
+QEMU_TESTS := $(filter-out $(RUST_QEMU_TEST),$(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c)))
 QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
                 $(patsubst %,c-tests/support/%.c,pty server model request)
 QEMU_FLAGS = $(CFLAGS) $(TEST_WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal -Iports/baremetal $(MODBUS)
-$(QEMU_TESTS) $(RUST_QEMU_TESTS): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
+$(QEMU_TESTS) $(RUST_QEMU_TEST): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
 	@mkdir -p $(@D)
 	@gcc $(QEMU_FLAGS) $< $(QEMU_SOURCES) \
 		-lmodbus -lcmocka -lpthread -o $@
@@ -28,8 +28,8 @@ SINGLE_PARTS_client := client ring
 test-firmware-rust: ## Run firmware in Rust on a Cortex-M7 in QEMU, over the traits of embedded-io, and on embassy
 	@scripts/need gcc libc6-dev pkg-config libmodbus-dev libcmocka-dev qemu-system-arm gcc-arm-none-eabi
 	@CARGO="$(CARGO)" examples/rust/build $(BUILD)/baremetal/mps2-an500
-	@$(MAKE) -s --no-print-directory $(RUST_QEMU_TESTS)
-	@scripts/check/run-c-tests $(RUST_QEMU_TESTS)
+	@$(MAKE) -s --no-print-directory $(RUST_QEMU_TEST)
+	@scripts/check/run-c-tests $(RUST_QEMU_TEST)
 
 .PHONY: test-firmware-qemu
 test-firmware-qemu: ## Run bare metal firmware on eight machines in QEMU: Arm, RISC-V, Xtensa

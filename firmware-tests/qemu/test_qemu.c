@@ -4,7 +4,6 @@
  *
  *     test_qemu [MACHINE...] */
 #include "device.h"
-#include "faults.h"
 #include "machine.h"
 #include "mbm.h"
 #include "report.h"
