@@ -2,8 +2,7 @@
  * that later calls overwrite; they are empty if nothing helps.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef ADVICE_H
-#define ADVICE_H
+#pragma once
 
 #include "place.h"
 
@@ -36,5 +35,3 @@ uint8_t advice_manual(uint8_t table, uint32_t number, uint16_t *address);
 
 /* Explains an ADDRESS that is such a number, with the command to use; or returns an empty text. */
 const char *advice_on_number(uint32_t number);
-
-#endif

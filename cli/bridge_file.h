@@ -10,8 +10,7 @@
  * docs/mqtt.md describes every key.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef BRIDGE_FILE_H
-#define BRIDGE_FILE_H
+#pragma once
 
 #include "bridge_line.h"
 #include "yaml_file.h"
@@ -85,5 +84,3 @@ int bridge_file_read(bridge_setup *into, const char *path);
 /* Copies settings and lines. Returns 0 without memory. */
 int bridge_setup_copy(bridge_setup *to, const bridge_setup *from);
 void bridge_setup_free(bridge_setup *setup);
-
-#endif

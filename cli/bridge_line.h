@@ -2,8 +2,7 @@
  * them, and writes what the broker sends.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef BRIDGE_LINE_H
-#define BRIDGE_LINE_H
+#pragma once
 
 #include "broker.h"
 #include "line.h"
@@ -113,5 +112,3 @@ void bridge_line_connected(bridge_line *l);
 
 /* Carries out a write to a field of the line. `name` is that after `below`. */
 void bridge_line_write(bridge_line *l, const char *name, const broker_event *event);
-
-#endif

@@ -3,8 +3,7 @@
  * what arrives to the program through a pipe, so the program needs no locks.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef BROKER_H
-#define BROKER_H
+#pragma once
 
 #include "device.h"
 #include "names.h"
@@ -73,5 +72,3 @@ void broker_publish_at(broker *of, const char *topic, const char *text);
 
 /* Publishes that the bridge is offline, and disconnects. */
 void broker_end(broker *of);
-
-#endif

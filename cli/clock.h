@@ -1,8 +1,7 @@
 /* The clocks of the system.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef CLOCK_H
-#define CLOCK_H
+#pragma once
 
 #include <stdint.h>
 #include <time.h>
@@ -23,5 +22,3 @@ const char *clock_text(uint64_t micros, int digits, char text[CLOCK_TEXT_BYTES])
 
 /* The same of the time now, in milliseconds. */
 const char *clock_now_text(char text[CLOCK_TEXT_BYTES]);
-
-#endif

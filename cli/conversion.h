@@ -2,8 +2,7 @@
  * available: what value_form has beyond type, order and scale.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef CONVERSION_H
-#define CONVERSION_H
+#pragma once
 
 #include "value.h"
 
@@ -48,5 +47,3 @@ int conversion_has_limits(const conversion *of);
 const char *conversion_check(const value_form *form, const char *text, size_t length);
 const char *conversion_check_registers(const value_form *form, const mbm_registers *registers,
                                        uint16_t address);
-
-#endif

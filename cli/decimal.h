@@ -1,8 +1,7 @@
 /* Decimal numbers that are added, multiplied, rounded and compared exactly.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DECIMAL_H
-#define DECIMAL_H
+#pragma once
 
 #include "value.h"
 
@@ -60,5 +59,3 @@ void decimal_print_scale(const value_scale *scale, char text[DECIMAL_BYTES]);
 
 /* Writes a number with an exponent, for value_read. Returns 0 if it has too many digits. */
 int decimal_print_exact(const decimal_number *number, char text[VALUE_LONGEST + 1]);
-
-#endif

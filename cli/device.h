@@ -1,8 +1,7 @@
 /* A device: its fields and what each of them is, as a device file says.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DEVICE_H
-#define DEVICE_H
+#pragma once
 
 #include "conversion.h"
 #include "reach.h"
@@ -125,5 +124,3 @@ const char *device_address_text(const device *of, uint8_t table, uint32_t addres
 
 /* Returns the most registers or bits of a table that one request writes. */
 uint16_t device_most_written(const device *of, uint8_t table);
-
-#endif

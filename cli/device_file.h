@@ -12,8 +12,7 @@
  * docs/device-file.md describes every key.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DEVICE_FILE_H
-#define DEVICE_FILE_H
+#pragma once
 
 #include "device.h"
 #include "yaml_file.h"
@@ -21,5 +20,3 @@
 /* Reads a file. Returns CODE_DONE; device_free frees the device. Otherwise returns CODE_SYSTEM or
  * CODE_WRONG, and sets `wrong` to a sentence without its full stop: "meter.yaml:12: ...". */
 int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES]);
-
-#endif

@@ -2,8 +2,7 @@
  * refusal. A node may be NULL where a key may be missing.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DEVICE_KEYS_H
-#define DEVICE_KEYS_H
+#pragma once
 
 #include "device.h"
 #include "yaml_file.h"
@@ -153,5 +152,3 @@ int device_repeat_name(yaml_file *file, const yaml_node_t *node, size_t most, ch
 /* Gives each field of a device its topic and its identifier. Returns 0 after refusing a name that
  * has none, or two names that become the same. */
 int device_names_make(yaml_file *file, device *of);
-
-#endif

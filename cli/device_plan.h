@@ -1,8 +1,7 @@
 /* The plan that reads the fields of a device: its storage, a trial of it, and its values as text.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DEVICE_PLAN_H
-#define DEVICE_PLAN_H
+#pragma once
 
 #include "device.h"
 
@@ -61,5 +60,3 @@ uint8_t device_plan_form(mbm_plan *plan, const device *of, uint16_t field, value
  * or if no value has arrived yet. */
 const char *device_plan_name(const mbm_plan *plan, const device *of, uint16_t field,
                              uint16_t index);
-
-#endif

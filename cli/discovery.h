@@ -3,8 +3,7 @@
  * switch and text.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef DISCOVERY_H
-#define DISCOVERY_H
+#pragma once
 
 #include "device.h"
 
@@ -24,5 +23,3 @@ void discovery_topic(const discovery_line *line, const device *of, uint16_t fiel
 /* Returns the message, which the caller frees, or NULL without memory, and writes its topic. */
 char *discovery_config(const discovery_line *line, const device *of, uint16_t field,
                        char topic[DISCOVERY_TOPIC_BYTES]);
-
-#endif

@@ -2,8 +2,7 @@
  * manners of devices of the field.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef FAULT_H
-#define FAULT_H
+#pragma once
 
 #include "place.h"
 
@@ -120,5 +119,3 @@ int fault_is_due(const fault_list *list, const fault *one);
 
 /* Finds the faults of that request; of several of one kind the last one. */
 void fault_choose(const fault_list *list, fault_choice *choice);
-
-#endif

@@ -2,8 +2,7 @@
  * pieces or not at all, and closes its connection.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef FAULT_PORT_H
-#define FAULT_PORT_H
+#pragma once
 
 #include "fault.h"
 #include "mbm.h"
@@ -68,5 +67,3 @@ uint32_t fault_port_delay(fault_port *port);
 /* Counts a request, and chooses the faults of its answer for the port that it came from. Returns
  * the exception that answers it, with which it is not carried out, or 0. */
 uint8_t fault_device_take(fault_device *device, const mbm_request *request);
-
-#endif

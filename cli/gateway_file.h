@@ -11,8 +11,7 @@
  * docs/gateway.md describes every key.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef GATEWAY_FILE_H
-#define GATEWAY_FILE_H
+#pragma once
 
 #include "place.h"
 #include "yaml_file.h"
@@ -64,5 +63,3 @@ const char *gateway_setup_listen(gateway_setup *to, const char *text);
  * its full stop: "gateway.yaml:3: ...". Free it in both cases. */
 int gateway_file_read(gateway_setup *into, const char *path);
 void gateway_setup_free(gateway_setup *setup);
-
-#endif

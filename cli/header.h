@@ -3,8 +3,7 @@
  * refused.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef HEADER_H
-#define HEADER_H
+#pragma once
 
 #include "device.h"
 
@@ -120,5 +119,3 @@ void header_write_special(const header *h, uint16_t at, const char *name, const 
 
 /* Writes the page of documentation. */
 void header_write_page(header *h);
-
-#endif

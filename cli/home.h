@@ -2,8 +2,7 @@
  * class. The words, and the units that go with them, are those of Home Assistant's documentation.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef HOME_H
-#define HOME_H
+#pragma once
 
 #include "device.h"
 
@@ -58,5 +57,3 @@ int home_has_unit(const home_class *of, const char *unit);
  * go with the unit of measurement. NULL, and HOME_NO_STATE, for none. */
 const char *home_class_of(const device_field *field, const mbm_planField *planned);
 int home_state_of(const device_field *field, const mbm_planField *planned);
-
-#endif

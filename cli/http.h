@@ -4,8 +4,7 @@
  * visitor delays neither the program nor others.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef HTTP_H
-#define HTTP_H
+#pragma once
 
 #include <poll.h>
 #include <stddef.h>
@@ -71,5 +70,3 @@ void http_polled(http *h, const struct pollfd *waits, nfds_t count);
 void http_work(http *h);
 
 void http_close(http *h);
-
-#endif

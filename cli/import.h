@@ -2,8 +2,7 @@
  * and what could not be taken over.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef IMPORT_H
-#define IMPORT_H
+#pragma once
 
 #include "tree.h"
 
@@ -92,5 +91,3 @@ int import_sunspec(import *j);
 /* Leaves out what the device file refuses, names it, and writes the file. Returns an exit code. */
 int import_write(import *j);
 void import_free(import *j);
-
-#endif

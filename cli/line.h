@@ -1,8 +1,7 @@
 /* A client of a place, which opens its line again when it was lost.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef LINE_H
-#define LINE_H
+#pragma once
 
 #include "port_over.h"
 #include "mbm_call.h"
@@ -132,5 +131,3 @@ uint32_t line_milliseconds(void);
 /* Reads the files of tls://. Returns NULL, or the path of the one that cannot be read, with errno
  * set. */
 const char *line_load_tls(const place *p, mbm_tls_files *files, mbm_tls_options *into);
-
-#endif

@@ -2,8 +2,7 @@
  * together with the line.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef LIVE_H
-#define LIVE_H
+#pragma once
 
 #include "http.h"
 #include "polled.h"
@@ -67,5 +66,3 @@ void live_note_round(live *l, uint32_t round);
 /* Waits for the line, for keys and for visitors of the page, at most for a time, and serves them.
  */
 void live_wait(live *l, uint32_t milliseconds);
-
-#endif

@@ -2,8 +2,7 @@
  * section "Names" of docs/device-file.md has the rule.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef NAMES_H
-#define NAMES_H
+#pragma once
 
 /* The most levels of a name: a/b/c has three. */
 enum { NAMES_LEVELS = 8 };
@@ -16,5 +15,3 @@ unsigned names_levels(const char *name);
  * them; they are NULL without memory. */
 char *names_topic(const char *name);
 char *names_identifier(const char *name);
-
-#endif

@@ -4,8 +4,7 @@
  * its full stop, which begins with the text in quotes.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef NUMBERS_H
-#define NUMBERS_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -46,5 +45,3 @@ int cursor_skip_char(cursor *in, char one);
 
 /* Skips a number as JSON has it (RFC 8259, 6). Returns 0 if there is none. */
 int cursor_skip_number(cursor *in);
-
-#endif

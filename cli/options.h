@@ -4,8 +4,7 @@
  *         {.argp = &options_unit}, {.argp = &options_client}, {0}};
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef OPTIONS_H
-#define OPTIONS_H
+#pragma once
 
 #include "conversion.h"
 #include "reach.h"
@@ -104,5 +103,3 @@ int gateway_command(int argc, char **argv);
 int header_command(int argc, char **argv);
 int import_command(int argc, char **argv);
 int bridge_command(int argc, char **argv);
-
-#endif

@@ -1,8 +1,7 @@
 /* The payload of a write of `mbm bridge`: from text to registers, exactly or not at all.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef PAYLOAD_H
-#define PAYLOAD_H
+#pragma once
 
 #include "value.h"
 
@@ -26,5 +25,3 @@ uint16_t payload_parse(const value_form *form, const char *payload, size_t lengt
  * without or with the brackets of a JSON array, or an object with such an array as "value". */
 uint16_t payload_parse_all(const value_form *form, uint16_t count, const char *payload,
                            size_t length, uint16_t words[PAYLOAD_WORDS], const char **wrong);
-
-#endif

@@ -7,8 +7,7 @@
  * frame are packets of raw data. A packet that is not a whole frame has a comment that says so.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef PCAP_FILE_H
-#define PCAP_FILE_H
+#pragma once
 
 #include "mbm.h"
 
@@ -43,5 +42,3 @@ void pcap_reconnect(pcap_link *link);
  * an ASCII frame as a sniffer reports it: decoded. Returns 0, or -1 with errno set. */
 int pcap_write(FILE *file, pcap_link *link, const mbm_traceRecord *record, uint64_t time,
                int decoded);
-
-#endif

@@ -12,8 +12,7 @@
  * one. pty: is a pseudo terminal for `mbm serve`, pty:/tmp/meter one with a link to it.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef PLACE_H
-#define PLACE_H
+#pragma once
 
 #include "mbm_tcp.h"
 #include "mbm_tty.h"
@@ -86,5 +85,3 @@ const char *place_host(const place *p);
 /* What to look at if a terminal could not be opened, or a server could not listen at an address.
  * Empty if nothing helps. */
 const char *place_advice(const place *p, int error);
-
-#endif

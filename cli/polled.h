@@ -2,8 +2,7 @@
  * its page.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef POLLED_H
-#define POLLED_H
+#pragma once
 
 #include "device_plan.h"
 #include "line.h"
@@ -84,5 +83,3 @@ uint32_t followed_failures(const followed_unit *unit);
 /* Writes how the reads of a unit ended: "unit 17: 240 reads, 2 without reply". Returns `text`. */
 enum { FOLLOWED_UNIT_BYTES = 160 };
 const char *followed_unit_text(const followed_unit *unit, char text[FOLLOWED_UNIT_BYTES]);
-
-#endif

@@ -2,8 +2,7 @@
  * found bytes.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef PORT_OVER_H
-#define PORT_OVER_H
+#pragma once
 
 #include "mbm.h"
 
@@ -66,5 +65,3 @@ mbm_port ahead_port_begin(ahead_port *port, const mbm_port *below);
 
 /* Whether it has bytes that its descriptor does not show any more. */
 int ahead_port_has_bytes(const ahead_port *port);
-
-#endif

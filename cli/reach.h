@@ -2,8 +2,7 @@
  * as options, at the head of a device file, and in the file of a bridge or gateway.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef REACH_H
-#define REACH_H
+#pragma once
 
 #include "mbm.h"
 #include "yaml_file.h"
@@ -90,5 +89,3 @@ const char *reach_fit(reach *of, const reach_line *line);
 /* Sets client and link; NULL for no link. `gapUs` is the gap of a serial line, 0: t3.5. */
 void reach_set(const reach *of, mbm_client *client, mbm_link *link, const reach_line *line,
                uint32_t gapUs);
-
-#endif

@@ -1,8 +1,7 @@
 /* What a line has received since its last request, to say why none of it is the reply.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef RECEIVED_H
-#define RECEIVED_H
+#pragma once
 
 #include "mbm.h"
 
@@ -29,5 +28,3 @@ const char *received_text(const received *from);
 
 /* Whether exactly the request came back, which a receiver does that hears its own driver. */
 int received_is_echo(const received *from);
-
-#endif

@@ -1,8 +1,7 @@
 /* What mbm says on stderr, and its exit codes.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef REPORT_H
-#define REPORT_H
+#pragma once
 
 #include <signal.h>
 #include <stddef.h>
@@ -101,5 +100,3 @@ void report_begin(void);
 
 /* Flushes stdout, and keeps the reason if that fails. */
 void report_flush(void);
-
-#endif

@@ -5,8 +5,7 @@
  * library such as ncurses would want the waiting for itself, which belongs to the line.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef SCREEN_H
-#define SCREEN_H
+#pragma once
 
 #include <stddef.h>
 
@@ -49,5 +48,3 @@ int screen_width(const char *text);
 
 /* Returns how many bytes of a text fit into so many columns. */
 size_t screen_fit(const char *text, int columns);
-
-#endif

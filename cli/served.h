@@ -2,8 +2,7 @@
  * hold what is written. A cell is a register, a coil or a discrete input.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef SERVED_H
-#define SERVED_H
+#pragma once
 
 #include "device.h"
 
@@ -60,5 +59,3 @@ void served_free(served_units *units);
 
 /* Returns the cells of the unit and table that a field of the device has. */
 served_cells *served_cells_of(const served_units *units, const mbm_planField *planned);
-
-#endif

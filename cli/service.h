@@ -2,8 +2,7 @@
  * level of log lines, SIGHUP and SIGUSR1, and reports to systemd.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef SERVICE_H
-#define SERVICE_H
+#pragma once
 
 #include "mbm.h"
 #include "http.h"
@@ -85,5 +84,3 @@ void service_is_reloading(void);
 
 /* Writes the statistics, and closes what service_begin has opened. */
 void service_end(service *s);
-
-#endif

@@ -2,8 +2,7 @@
  * terminal each get a part of its bytes.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef TERMINAL_H
-#define TERMINAL_H
+#pragma once
 
 #include "place.h"
 
@@ -19,5 +18,3 @@ void terminal_free(int fd);
 
 /* An error number of a place in words. EBUSY of a terminal names the program that has it. */
 const char *terminal_error_text(const place *where, int error);
-
-#endif

@@ -4,8 +4,7 @@
  * Without the options the ports are as they were, and nothing is traced.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef TRACE_H
-#define TRACE_H
+#pragma once
 
 #include "mbm.h"
 
@@ -25,5 +24,3 @@ mbm_port trace_server(mbm_port port, uint8_t framing, const char *name);
 
 /* Traces an event of a sniffer. `time` is in microseconds since 1970. */
 void trace_event(const mbm_event *event, uint8_t framing, const char *name, uint64_t time);
-
-#endif

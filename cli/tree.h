@@ -2,8 +2,7 @@
  * and maps, each with its line. What is looked up is marked, so that the rest can be named.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef TREE_H
-#define TREE_H
+#pragma once
 
 #include "yaml_file.h"
 
@@ -46,5 +45,3 @@ int tree_line(const tree *map, const char *key);
 
 /* Marks a node and all below it as used. */
 void tree_use(tree *of);
-
-#endif

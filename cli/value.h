@@ -1,8 +1,7 @@
 /* Values of registers and bits as text: exactly, or not at all.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef VALUE_H
-#define VALUE_H
+#pragma once
 
 #include "value_types.h"
 
@@ -63,5 +62,3 @@ const char *value_set_text(const value_form *form, const mbm_registers *register
  * an empty text, if the registers hold no value of the type. */
 uint8_t value_print(const value_form *form, const mbm_registers *registers, uint16_t address,
                     uint16_t count, int is_json, char text[VALUE_TEXT_BYTES]);
-
-#endif

@@ -1,8 +1,7 @@
 /* Dates and times of registers as text of ISO 8601, and back: exactly, or not at all.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef VALUE_DATES_H
-#define VALUE_DATES_H
+#pragma once
 
 #include "value.h"
 
@@ -26,5 +25,3 @@ uint8_t value_date_print(const value_form *form, const mbm_registers *registers,
  * number of words, or 0 with the reason in `wrong`: a clause. */
 uint16_t value_date_read(const value_form *form, const char *text, size_t length,
                          uint16_t words[VALUE_WORDS], const char **wrong);
-
-#endif

@@ -2,8 +2,7 @@
  * them. A plan reads the latter as MBM_TYPE_REGISTERS.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef VALUE_TYPES_H
-#define VALUE_TYPES_H
+#pragma once
 
 #include "mbm.h"
 
@@ -92,5 +91,3 @@ uint8_t value_get_integer(uint8_t type, uint8_t order, const mbm_registers *regi
                           uint16_t address, uint64_t *amount, int *is_negative);
 void value_set_integer(uint8_t type, uint8_t order, const mbm_registers *registers,
                        uint16_t address, uint64_t integer);
-
-#endif

@@ -1,8 +1,7 @@
 /* A configuration file in YAML, read strictly: each refusal names the file and its line.
  *
  * Licence: MIT OR Apache-2.0. */
-#ifndef YAML_FILE_H
-#define YAML_FILE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -92,5 +91,3 @@ typedef struct yaml_file_pair {
 } yaml_file_pair;
 const yaml_node_t *yaml_file_item(yaml_file *file, const yaml_node_t *list, size_t at);
 yaml_file_pair yaml_file_pair_at(yaml_file *file, const yaml_node_t *mapping, size_t at);
-
-#endif
