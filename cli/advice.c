@@ -1,7 +1,5 @@
 /* Chooses the advice after a failure: by the kind of line, the status, the exception, and the words
- * of the command line.
- *
- * Licence: MIT OR Apache-2.0. */
+ * of the command line. */
 #include "advice.h"
 
 #include "numbers.h"

@@ -1,7 +1,5 @@
 /* What to look at after a failure, in sentences without their full stop. The texts are in buffers
- * that later calls overwrite; they are empty if nothing helps.
- *
- * Licence: MIT OR Apache-2.0. */
+ * that later calls overwrite; they are empty if nothing helps. */
 #pragma once
 
 #include "place.h"

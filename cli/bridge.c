@@ -1,7 +1,5 @@
 /* Publishes the values of device files to an MQTT broker, and writes what the broker sends: `mbm
- * bridge`. docs/mqtt.md has the topics and the options.
- *
- * Licence: MIT OR Apache-2.0. */
+ * bridge`. docs/mqtt.md has the topics and the options. */
 #include "bridge_file.h"
 #include "device_plan.h"
 #include "discovery.h"

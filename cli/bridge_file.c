@@ -1,6 +1,4 @@
-/* Checks and keeps the settings of a bridge, from options or a file, and reads that file.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Checks and keeps the settings of a bridge, from options or a file, and reads that file. */
 #include "bridge_file.h"
 
 #include "device_plan.h"

@@ -7,9 +7,7 @@
  *         file: meter.yaml
  *       - {line: "tcp://192.168.0.7", file: pump.yaml, topic: pump}
  *
- * docs/mqtt.md describes every key.
- *
- * Licence: MIT OR Apache-2.0. */
+ * docs/mqtt.md describes every key. */
 #pragma once
 
 #include "bridge_line.h"

@@ -1,6 +1,4 @@
-/* Reads a line's table, publishes its values and units, and carries out writes.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads a line's table, publishes its values and units, and carries out writes. */
 #include "bridge_line.h"
 
 #include "clock.h"

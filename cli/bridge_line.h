@@ -1,7 +1,5 @@
 /* A line of the bridge, and its table: reads the fields of a device file with a plan, publishes
- * them, and writes what the broker sends.
- *
- * Licence: MIT OR Apache-2.0. */
+ * them, and writes what the broker sends. */
 #pragma once
 
 #include "broker.h"

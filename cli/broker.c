@@ -1,6 +1,5 @@
 /* Connects to the broker with libmosquitto, and hands what arrives to the program through a pipe.
- *
- * Licence: MIT OR Apache-2.0. */
+ */
 #include "broker.h"
 
 #include "report.h"

@@ -1,8 +1,6 @@
 /* The connection of `mbm bridge` to its MQTT broker, by libmosquitto. A thread of libmosquitto
  * connects, and connects again after the broker was lost, after 1 s, then 2 s, up to 30 s. It hands
- * what arrives to the program through a pipe, so the program needs no locks.
- *
- * Licence: MIT OR Apache-2.0. */
+ * what arrives to the program through a pipe, so the program needs no locks. */
 #pragma once
 
 #include "device.h"

@@ -1,4 +1,4 @@
-/* mbm call: sends any request. Licence: MIT OR Apache-2.0. */
+/* mbm call: sends any request. */
 #include "advice.h"
 #include "line.h"
 #include "numbers.h"

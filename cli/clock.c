@@ -1,6 +1,4 @@
-/* Reads the clocks, and writes times as text.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads the clocks, and writes times as text. */
 #include "clock.h"
 
 #include <stdio.h>

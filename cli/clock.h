@@ -1,6 +1,4 @@
-/* The clocks of the system.
- *
- * Licence: MIT OR Apache-2.0. */
+/* The clocks of the system. */
 #pragma once
 
 #include <stdint.h>

@@ -1,7 +1,5 @@
 /* Converts values as their form says, in decimal arithmetic, on the text that value.c writes and
- * reads of a number: so it holds for every type.
- *
- * Licence: MIT OR Apache-2.0. */
+ * reads of a number: so it holds for every type. */
 #include "conversion.h"
 
 #include "decimal.h"

@@ -1,7 +1,5 @@
 /* Values with an offset, with a precision, with limits for writes, and values that are not
- * available: what value_form has beyond type, order and scale.
- *
- * Licence: MIT OR Apache-2.0. */
+ * available: what value_form has beyond type, order and scale. */
 #pragma once
 
 #include "value.h"

@@ -1,6 +1,4 @@
-/* Adds, multiplies, rounds and compares decimal numbers, digit by digit.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Adds, multiplies, rounds and compares decimal numbers, digit by digit. */
 #include "decimal.h"
 
 #include "numbers.h"

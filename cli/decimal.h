@@ -1,6 +1,4 @@
-/* Decimal numbers that are added, multiplied, rounded and compared exactly.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Decimal numbers that are added, multiplied, rounded and compared exactly. */
 #pragma once
 
 #include "value.h"

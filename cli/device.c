@@ -1,6 +1,4 @@
-/* Finds, measures and frees the fields of a device.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Finds, measures and frees the fields of a device. */
 #include "device.h"
 
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* A device: its fields and what each of them is, as a device file says.
- *
- * Licence: MIT OR Apache-2.0. */
+/* A device: its fields and what each of them is, as a device file says. */
 #pragma once
 
 #include "conversion.h"

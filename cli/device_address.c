@@ -1,6 +1,4 @@
-/* Reads addresses as on the wire, from 1 on, and as Modicon and others write them: 40101, HR101.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads addresses as on the wire, from 1 on, and as Modicon and others write them: 40101, HR101. */
 #include "device_keys.h"
 
 #include "numbers.h"

@@ -1,7 +1,5 @@
 /* Reads the keys of a device file, each field with its value and enumeration, and refuses what
- * contradicts itself.
- *
- * Licence: MIT OR Apache-2.0. */
+ * contradicts itself. */
 #include "device_file.h"
 
 #include "device_keys.h"

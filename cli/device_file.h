@@ -9,9 +9,7 @@
  *         address: 0
  *         type: float
  *
- * docs/device-file.md describes every key.
- *
- * Licence: MIT OR Apache-2.0. */
+ * docs/device-file.md describes every key. */
 #pragma once
 
 #include "device.h"

@@ -1,6 +1,4 @@
-/* Reads the keys of a field for Home Assistant, and refuses what Home Assistant would refuse.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads the keys of a field for Home Assistant, and refuses what Home Assistant would refuse. */
 #include "device_keys.h"
 
 #include "home.h"

@@ -1,7 +1,5 @@
 /* The readers of a device file's keys, in groups; device_file.c calls them. Each returns 0 after a
- * refusal. A node may be NULL where a key may be missing.
- *
- * Licence: MIT OR Apache-2.0. */
+ * refusal. A node may be NULL where a key may be missing. */
 #pragma once
 
 #include "device.h"

@@ -1,6 +1,4 @@
-/* Reads the limits of a device, and checks its fields against them.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads the limits of a device, and checks its fields against them. */
 #include "device_keys.h"
 
 #include <errno.h>

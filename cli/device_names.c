@@ -1,6 +1,5 @@
 /* The names of a device file: those of repeated fields, and the topic and identifier of each field.
- *
- * Licence: MIT OR Apache-2.0. */
+ */
 #include "device_keys.h"
 
 #include "mbm.h"

@@ -1,6 +1,4 @@
-/* Makes and tries the plan of a device, and writes what it has read.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Makes and tries the plan of a device, and writes what it has read. */
 #include "device_plan.h"
 
 #include "numbers.h"

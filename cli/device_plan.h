@@ -1,6 +1,5 @@
 /* The plan that reads the fields of a device: its storage, a trial of it, and its values as text.
- *
- * Licence: MIT OR Apache-2.0. */
+ */
 #pragma once
 
 #include "device.h"

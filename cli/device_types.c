@@ -1,6 +1,4 @@
-/* Reads what completes the type of a field, and refuses what does not go with it.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads what completes the type of a field, and refuses what does not go with it. */
 #include "device_keys.h"
 
 #include "numbers.h"

@@ -1,7 +1,5 @@
 /* Reads what the numbers of a field mean, its value at first and its enumeration, and refuses what
- * its type cannot have.
- *
- * Licence: MIT OR Apache-2.0. */
+ * its type cannot have. */
 #include "device_keys.h"
 
 #include "conversion.h"

@@ -1,6 +1,4 @@
-/* Writes the topics and the JSON of Home Assistant's MQTT discovery.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Writes the topics and the JSON of Home Assistant's MQTT discovery. */
 #include "discovery.h"
 
 #include "home.h"

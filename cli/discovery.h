@@ -1,8 +1,6 @@
 /* Home Assistant's MQTT discovery: a retained message for each field, from which Home Assistant
  * makes an entity. The keys are those of its documentation of MQTT sensor, binary sensor, number,
- * switch and text.
- *
- * Licence: MIT OR Apache-2.0. */
+ * switch and text. */
 #pragma once
 
 #include "device.h"

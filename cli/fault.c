@@ -1,6 +1,4 @@
-/* Reads --fault, and chooses the faults of each request.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads --fault, and chooses the faults of each request. */
 #include "fault.h"
 
 #include "numbers.h"

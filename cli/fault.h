@@ -1,7 +1,5 @@
 /* The faults that mbm serve plays on request, --fault KIND[=VALUE][@WHEN]: those of a line, and the
- * manners of devices of the field.
- *
- * Licence: MIT OR Apache-2.0. */
+ * manners of devices of the field. */
 #pragma once
 
 #include "place.h"

@@ -1,6 +1,4 @@
-/* Refuses and drops requests as devices of the field do, and sends answers with their faults.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Refuses and drops requests as devices of the field do, and sends answers with their faults. */
 #include "fault_port.h"
 
 #include "clock.h"

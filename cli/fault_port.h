@@ -1,7 +1,5 @@
 /* The port of a server that plays the faults of its answers: changes them, sends them late, in
- * pieces or not at all, and closes its connection.
- *
- * Licence: MIT OR Apache-2.0. */
+ * pieces or not at all, and closes its connection. */
 #pragma once
 
 #include "fault.h"

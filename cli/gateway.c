@@ -2,9 +2,7 @@
  * over mbm_gateway.
  *
  * The gateway never blocks, except to look up a host by name: while one line waits for a device,
- * the others and all connections go on. docs/gateway.md says what a client gets.
- *
- * Licence: MIT OR Apache-2.0. */
+ * the others and all connections go on. docs/gateway.md says what a client gets. */
 #include "port_over.h"
 #include "advice.h"
 #include "clock.h"

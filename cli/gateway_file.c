@@ -1,6 +1,4 @@
-/* Reads the lines, the map of units and the settings of a gateway, and its file.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads the lines, the map of units and the settings of a gateway, and its file. */
 #include "gateway_file.h"
 
 #include "numbers.h"

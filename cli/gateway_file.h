@@ -8,9 +8,7 @@
  *         units: 1-31
  *       - {line: "tcp://192.168.0.7", units: 101-131=1, in_flight: 4}
  *
- * docs/gateway.md describes every key.
- *
- * Licence: MIT OR Apache-2.0. */
+ * docs/gateway.md describes every key. */
 #pragma once
 
 #include "place.h"

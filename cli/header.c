@@ -1,6 +1,4 @@
-/* mbm header: writes the C header of a device for firmware, or a page about it.
- *
- * Licence: MIT OR Apache-2.0. */
+/* mbm header: writes the C header of a device for firmware, or a page about it. */
 #include "header.h"
 
 #include "device_file.h"

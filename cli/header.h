@@ -1,8 +1,6 @@
 /* The C header of a device: what cli/header.c, which is `mbm header`, shares with the writers of
  * its parts. Each part is written to `out`, which is in memory: nothing is kept of a header that is
- * refused.
- *
- * Licence: MIT OR Apache-2.0. */
+ * refused. */
 #pragma once
 
 #include "device.h"

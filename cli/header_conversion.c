@@ -1,7 +1,5 @@
 /* The part of a device's header that converts what a plan has read: offsets, powers of ten, and
- * numbers that mean "not available", as constants with functions around them.
- *
- * Licence: MIT OR Apache-2.0. */
+ * numbers that mean "not available", as constants with functions around them. */
 #include "header.h"
 
 #include "decimal.h"

@@ -1,7 +1,5 @@
 /* The part of a device's header on what may be written to a field: in words, and as constants that
- * compare with the number in the registers.
- *
- * Licence: MIT OR Apache-2.0. */
+ * compare with the number in the registers. */
 #include "header.h"
 
 #include "decimal.h"

@@ -1,7 +1,5 @@
 /* The part of a device's header on what the device needs to be reached: constants, and functions
- * that set a client and a link so.
- *
- * Licence: MIT OR Apache-2.0. */
+ * that set a client and a link so. */
 #include "header.h"
 
 #include <inttypes.h>

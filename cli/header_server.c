@@ -1,7 +1,5 @@
 /* The part of a device's header for a server: its tables, what clients may do with their cells, and
- * the functions that get and set the value of a field in them.
- *
- * Licence: MIT OR Apache-2.0. */
+ * the functions that get and set the value of a field in them. */
 #include "header.h"
 
 #include "numbers.h"

@@ -1,7 +1,5 @@
 /* The parts of a device's header that every program may include, which are the constants of its
- * fields and the table of its plan; and the page of documentation, in Markdown.
- *
- * Licence: MIT OR Apache-2.0. */
+ * fields and the table of its plan; and the page of documentation, in Markdown. */
 #include "header.h"
 
 #include "report.h"

@@ -1,7 +1,5 @@
 /* The part of a device's header for types that a plan does not know: functions that take the value
- * of a field out of registers and put it into them, and that get it of a plan with its scale.
- *
- * Licence: MIT OR Apache-2.0. */
+ * of a field out of registers and put it into them, and that get it of a plan with its scale. */
 #include "header.h"
 
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* The kinds of entities, device classes and state classes of Home Assistant.
- *
- * Licence: MIT OR Apache-2.0. */
+/* The kinds of entities, device classes and state classes of Home Assistant. */
 #include "home.h"
 
 #include <string.h>

@@ -1,7 +1,6 @@
 /* What Home Assistant makes of a field: the kind of its entity, its device class and its state
  * class. The words, and the units that go with them, are those of Home Assistant's documentation.
- *
- * Licence: MIT OR Apache-2.0. */
+ */
 #pragma once
 
 #include "device.h"

@@ -1,6 +1,4 @@
-/* Accepts the connections of visitors, reads their requests, and answers them.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Accepts the connections of visitors, reads their requests, and answers them. */
 #include "http.h"
 
 #include "clock.h"

@@ -1,9 +1,7 @@
 /* A responder of HTTP/1.0 for a few texts that can only be read: the metrics of a service, and the
  * page of mbm poll. It never blocks, has a fixed number of places, of which the oldest is freed for
  * a new connection, and renders a text at most ten times a second, so that a slow or hostile
- * visitor delays neither the program nor others.
- *
- * Licence: MIT OR Apache-2.0. */
+ * visitor delays neither the program nor others. */
 #pragma once
 
 #include <poll.h>

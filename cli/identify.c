@@ -1,4 +1,4 @@
-/* mbm identify: shows what a device says about itself. Licence: MIT OR Apache-2.0. */
+/* mbm identify: shows what a device says about itself. */
 #include "advice.h"
 #include "line.h"
 #include "options.h"

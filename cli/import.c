@@ -1,6 +1,4 @@
-/* mbm import: makes a device file of another program's configuration.
- *
- * Licence: MIT OR Apache-2.0. */
+/* mbm import: makes a device file of another program's configuration. */
 #include "import.h"
 
 #include "options.h"

@@ -1,7 +1,5 @@
 /* The device file that `mbm import` makes of another program's configuration: its keys and fields,
- * and what could not be taken over.
- *
- * Licence: MIT OR Apache-2.0. */
+ * and what could not be taken over. */
 #pragma once
 
 #include "tree.h"

@@ -1,7 +1,5 @@
 /* Collects the keys and fields of an import, leaves out what a device file cannot have, and writes
- * the rest.
- *
- * Licence: MIT OR Apache-2.0. */
+ * the rest. */
 #include "import.h"
 
 #include "device_file.h"

@@ -1,6 +1,4 @@
-/* Imports the YAML of Home Assistant's integration modbus: the keys of its documentation.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Imports the YAML of Home Assistant's integration modbus: the keys of its documentation. */
 #include "import.h"
 
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* Imports the description of a SunSpec model: its points and groups, in JSON.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Imports the description of a SunSpec model: its points and groups, in JSON. */
 #include "import.h"
 
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* Imports the TOML of telegraf's inputs.modbus, in its styles register, request and metric.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Imports the TOML of telegraf's inputs.modbus, in its styles register, request and metric. */
 #include "import.h"
 
 #include "numbers.h"

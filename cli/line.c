@@ -1,6 +1,4 @@
-/* Opens the lines of clients, keeps them open, and says why a request got no reply.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Opens the lines of clients, keeps them open, and says why a request got no reply. */
 #include "line.h"
 
 #include "advice.h"

@@ -1,6 +1,4 @@
-/* A client of a place, which opens its line again when it was lost.
- *
- * Licence: MIT OR Apache-2.0. */
+/* A client of a place, which opens its line again when it was lost. */
 #pragma once
 
 #include "port_over.h"

@@ -1,6 +1,4 @@
-/* Draws the table, answers for the page, and waits for both and for the line.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Draws the table, answers for the page, and waits for both and for the line. */
 #include "live.h"
 
 #include "clock.h"

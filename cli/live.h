@@ -1,7 +1,5 @@
 /* The table and the page of mbm poll while it polls: both show the values at any time, and wait
- * together with the line.
- *
- * Licence: MIT OR Apache-2.0. */
+ * together with the line. */
 #pragma once
 
 #include "http.h"

@@ -1,6 +1,4 @@
-/* mbm: one tool for Modbus devices. This file chooses the command.
- *
- * Licence: MIT OR Apache-2.0. */
+/* mbm: one tool for Modbus devices. This file chooses the command. */
 #include "options.h"
 #include "mbm.h"
 #include "report.h"

@@ -1,6 +1,4 @@
-/* Turns names into topics and identifiers.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Turns names into topics and identifiers. */
 #include "names.h"
 
 #include <ctype.h>

@@ -1,7 +1,5 @@
 /* What the name of a field becomes in topics, and in identifiers of C and Home Assistant. The
- * section "Names" of docs/device-file.md has the rule.
- *
- * Licence: MIT OR Apache-2.0. */
+ * section "Names" of docs/device-file.md has the rule. */
 #pragma once
 
 /* The most levels of a name: a/b/c has three. */

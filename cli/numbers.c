@@ -1,6 +1,4 @@
-/* Reads numbers, times and words, and says what is wrong with them.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads numbers, times and words, and says what is wrong with them. */
 #include "numbers.h"
 
 #include <ctype.h>

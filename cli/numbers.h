@@ -1,9 +1,7 @@
 /* Numbers, times and words as people type them, read strictly.
  *
  * Each function returns NULL, or what is wrong with the text, as say makes it: a sentence without
- * its full stop, which begins with the text in quotes.
- *
- * Licence: MIT OR Apache-2.0. */
+ * its full stop, which begins with the text in quotes. */
 #pragma once
 
 #include <stddef.h>

@@ -1,6 +1,4 @@
-/* Parses the options that several commands share.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Parses the options that several commands share. */
 #include "options.h"
 
 #include "decimal.h"

@@ -1,9 +1,7 @@
 /* The commands, and the options that several of them share, as children of their argp parsers.
  *
  *     static const struct argp_child children[] = {
- *         {.argp = &options_unit}, {.argp = &options_client}, {0}};
- *
- * Licence: MIT OR Apache-2.0. */
+ *         {.argp = &options_unit}, {.argp = &options_client}, {0}}; */
 #pragma once
 
 #include "conversion.h"

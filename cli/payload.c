@@ -1,6 +1,4 @@
-/* Parses the payloads of writes: numbers, truth values, texts, and JSON with these.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Parses the payloads of writes: numbers, truth values, texts, and JSON with these. */
 #include "payload.h"
 
 #include "conversion.h"

@@ -1,6 +1,4 @@
-/* The payload of a write of `mbm bridge`: from text to registers, exactly or not at all.
- *
- * Licence: MIT OR Apache-2.0. */
+/* The payload of a write of `mbm bridge`: from text to registers, exactly or not at all. */
 #pragma once
 
 #include "value.h"

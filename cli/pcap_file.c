@@ -1,6 +1,4 @@
-/* Writes the blocks of a pcapng file, with the headers that Wireshark needs.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Writes the blocks of a pcapng file, with the headers that Wireshark needs. */
 #include "pcap_file.h"
 
 #include <string.h>

@@ -4,9 +4,7 @@
  * server's port 502. RTU frames are written as packets for Wireshark's dissector of Modbus RTU,
  * between two TCP ports; that of the server is PCAP_RTU_PORT. An ASCII frame is written as the RTU
  * frame with the same content, because Wireshark does not know Modbus ASCII. Bytes that are no
- * frame are packets of raw data. A packet that is not a whole frame has a comment that says so.
- *
- * Licence: MIT OR Apache-2.0. */
+ * frame are packets of raw data. A packet that is not a whole frame has a comment that says so. */
 #pragma once
 
 #include "mbm.h"

@@ -1,6 +1,4 @@
-/* Reads the names of lines, and knows what each kind of line may have.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads the names of lines, and knows what each kind of line may have. */
 #include "place.h"
 
 #include "numbers.h"

@@ -9,9 +9,7 @@
  *     tls://192.168.0.7?ca=ca.pem&cert=me.pem&key=me.key.pem&name=meter.example
  *
  * A server listens at the place: tcp://:1502 at all addresses of the machine, with port 0 at a free
- * one. pty: is a pseudo terminal for `mbm serve`, pty:/tmp/meter one with a link to it.
- *
- * Licence: MIT OR Apache-2.0. */
+ * one. pty: is a pseudo terminal for `mbm serve`, pty:/tmp/meter one with a link to it. */
 #pragma once
 
 #include "mbm_tcp.h"

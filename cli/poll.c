@@ -1,4 +1,4 @@
-/* mbm poll: reads the fields of a device file again and again. Licence: MIT OR Apache-2.0. */
+/* mbm poll: reads the fields of a device file again and again. */
 #include "advice.h"
 #include "clock.h"
 #include "device_file.h"

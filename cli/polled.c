@@ -1,6 +1,4 @@
-/* Writes values, names and statuses of polled fields.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Writes values, names and statuses of polled fields. */
 #include "polled.h"
 
 #include "clock.h"

@@ -1,7 +1,5 @@
 /* The fields that mbm poll reads, and what it says of each of them: in its table, in JSON, and on
- * its page.
- *
- * Licence: MIT OR Apache-2.0. */
+ * its page. */
 #pragma once
 
 #include "device_plan.h"

@@ -1,6 +1,4 @@
-/* The ports over other ports: what they pass on, hold back and read ahead.
- *
- * Licence: MIT OR Apache-2.0. */
+/* The ports over other ports: what they pass on, hold back and read ahead. */
 #include "port_over.h"
 
 #include "clock.h"

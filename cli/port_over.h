@@ -1,7 +1,5 @@
 /* Ports over other ports: one that passes all calls on, and two that read only when a wait has
- * found bytes.
- *
- * Licence: MIT OR Apache-2.0. */
+ * found bytes. */
 #pragma once
 
 #include "mbm.h"

@@ -1,6 +1,4 @@
-/* Reads what a device needs to be reached, and sets client and link so.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads what a device needs to be reached, and sets client and link so. */
 #include "reach.h"
 
 #include "numbers.h"

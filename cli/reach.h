@@ -1,7 +1,5 @@
 /* What a device needs that deviates from the standard, or that needs time: in the name of a line,
- * as options, at the head of a device file, and in the file of a bridge or gateway.
- *
- * Licence: MIT OR Apache-2.0. */
+ * as options, at the head of a device file, and in the file of a bridge or gateway. */
 #pragma once
 
 #include "mbm.h"

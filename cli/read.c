@@ -1,4 +1,4 @@
-/* mbm read: reads values once, or again and again. Licence: MIT OR Apache-2.0. */
+/* mbm read: reads values once, or again and again. */
 #include "advice.h"
 #include "clock.h"
 #include "line.h"

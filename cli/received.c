@@ -1,6 +1,4 @@
-/* Notes the bytes that pass a port, and says in words what is wrong with them.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Notes the bytes that pass a port, and says in words what is wrong with them. */
 #include "received.h"
 
 #include "numbers.h"

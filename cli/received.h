@@ -1,6 +1,4 @@
-/* What a line has received since its last request, to say why none of it is the reply.
- *
- * Licence: MIT OR Apache-2.0. */
+/* What a line has received since its last request, to say why none of it is the reply. */
 #pragma once
 
 #include "mbm.h"

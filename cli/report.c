@@ -1,6 +1,4 @@
-/* Prints sentences, log lines and JSON, and keeps the exit code.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Prints sentences, log lines and JSON, and keeps the exit code. */
 #include "report.h"
 
 #include "mbm.h"

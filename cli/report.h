@@ -1,6 +1,4 @@
-/* What mbm says on stderr, and its exit codes.
- *
- * Licence: MIT OR Apache-2.0. */
+/* What mbm says on stderr, and its exit codes. */
 #pragma once
 
 #include <signal.h>

@@ -1,4 +1,4 @@
-/* mbm scan: finds the units that answer, or their SunSpec models. Licence: MIT OR Apache-2.0. */
+/* mbm scan: finds the units that answer, or their SunSpec models. */
 #include "advice.h"
 #include "line.h"
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* Takes over the terminal, and gives it back.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Takes over the terminal, and gives it back. */
 #include "screen.h"
 
 #include <errno.h>

@@ -2,9 +2,7 @@
  * ends the program, except SIGKILL, the terminal is as it was before.
  *
  * Escapes of every terminal since the VT100 are enough for a table that is drawn as a whole; a
- * library such as ncurses would want the waiting for itself, which belongs to the line.
- *
- * Licence: MIT OR Apache-2.0. */
+ * library such as ncurses would want the waiting for itself, which belongs to the line. */
 #pragma once
 
 #include <stddef.h>

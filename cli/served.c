@@ -1,6 +1,4 @@
-/* Makes the units that mbm serve serves, and gets and sets their cells.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Makes the units that mbm serve serves, and gets and sets their cells. */
 #include "served.h"
 
 #include <stdlib.h>

@@ -1,7 +1,5 @@
 /* The data that mbm serve serves: units whose cells come from a device file, vary at random, or
- * hold what is written. A cell is a register, a coil or a discrete input.
- *
- * Licence: MIT OR Apache-2.0. */
+ * hold what is written. A cell is a register, a coil or a discrete input. */
 #pragma once
 
 #include "device.h"

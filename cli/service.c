@@ -1,6 +1,4 @@
-/* Runs what services share: signals, systemd, statistics, and the wait for descriptors.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Runs what services share: signals, systemd, statistics, and the wait for descriptors. */
 #include "service.h"
 
 #include "clock.h"

@@ -1,7 +1,5 @@
 /* What mbm gateway and mbm bridge have as services: statistics in a file and for Prometheus, the
- * level of log lines, SIGHUP and SIGUSR1, and reports to systemd.
- *
- * Licence: MIT OR Apache-2.0. */
+ * level of log lines, SIGHUP and SIGUSR1, and reports to systemd. */
 #pragma once
 
 #include "mbm.h"

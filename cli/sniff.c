@@ -1,7 +1,5 @@
 /* mbm sniff: watches a bus, prints one line for each event, and sends nothing. It also reads the
- * recording of a bus as text.
- *
- * Licence: MIT OR Apache-2.0. */
+ * recording of a bus as text. */
 #include "clock.h"
 #include "line.h"
 #include "options.h"

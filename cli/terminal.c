@@ -1,6 +1,4 @@
-/* Opens terminals, and finds in /proc which program has one open.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Opens terminals, and finds in /proc which program has one open. */
 #include "terminal.h"
 
 #include "numbers.h"

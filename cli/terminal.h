@@ -1,7 +1,5 @@
 /* The terminals of serial lines, which the tool opens for itself alone: two programs that read one
- * terminal each get a part of its bytes.
- *
- * Licence: MIT OR Apache-2.0. */
+ * terminal each get a part of its bytes. */
 #pragma once
 
 #include "place.h"

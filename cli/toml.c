@@ -1,7 +1,5 @@
 /* Reads TOML as far as configuration files need it: tables and arrays of tables, dotted and quoted
- * keys, strings of all four kinds, arrays, inline tables, and every other value as a word.
- *
- * Licence: MIT OR Apache-2.0. */
+ * keys, strings of all four kinds, arrays, inline tables, and every other value as a word. */
 #include "report.h"
 #include "tree.h"
 

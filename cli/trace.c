@@ -1,6 +1,4 @@
-/* Takes the frames of traced ports and sniffers, prints them, and writes them to a file.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Takes the frames of traced ports and sniffers, prints them, and writes them to a file. */
 #include "trace.h"
 
 #include "clock.h"

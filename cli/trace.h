@@ -1,9 +1,7 @@
 /* The options --trace and --pcap FILE: every frame that the program sends, receives or overhears,
  * in words on stderr, and in a file for Wireshark.
  *
- * Without the options the ports are as they were, and nothing is traced.
- *
- * Licence: MIT OR Apache-2.0. */
+ * Without the options the ports are as they were, and nothing is traced. */
 #pragma once
 
 #include "mbm.h"

@@ -1,6 +1,4 @@
-/* Keeps the contents of a file as a tree, and reads it from YAML.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Keeps the contents of a file as a tree, and reads it from YAML. */
 #include "tree.h"
 
 #include "report.h"

@@ -1,7 +1,5 @@
 /* The contents of a configuration file of another program, from YAML, JSON or TOML: words, lists
- * and maps, each with its line. What is looked up is marked, so that the rest can be named.
- *
- * Licence: MIT OR Apache-2.0. */
+ * and maps, each with its line. What is looked up is marked, so that the rest can be named. */
 #pragma once
 
 #include "yaml_file.h"

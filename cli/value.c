@@ -1,6 +1,4 @@
-/* Reads numbers into registers, and writes registers as text, without rounding.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads numbers into registers, and writes registers as text, without rounding. */
 #include "value.h"
 
 #include "decimal.h"

@@ -1,6 +1,4 @@
-/* Values of registers and bits as text: exactly, or not at all.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Values of registers and bits as text: exactly, or not at all. */
 #pragma once
 
 #include "value_types.h"

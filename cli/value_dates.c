@@ -1,6 +1,4 @@
-/* Reads and writes dates as text, and converts them to the forms that registers have.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Reads and writes dates as text, and converts them to the forms that registers have. */
 #include "value_dates.h"
 
 #include "numbers.h"

@@ -1,6 +1,4 @@
-/* Dates and times of registers as text of ISO 8601, and back: exactly, or not at all.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Dates and times of registers as text of ISO 8601, and back: exactly, or not at all. */
 #pragma once
 
 #include "value.h"

@@ -1,6 +1,4 @@
-/* Names, sizes and ranges of the types of values, and their integers.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Names, sizes and ranges of the types of values, and their integers. */
 #include "value_types.h"
 
 #include <stddef.h>

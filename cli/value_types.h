@@ -1,7 +1,5 @@
 /* The types of values: the ten of a plan, and those that the functions on mbm_registers have beside
- * them. A plan reads the latter as MBM_TYPE_REGISTERS.
- *
- * Licence: MIT OR Apache-2.0. */
+ * them. A plan reads the latter as MBM_TYPE_REGISTERS. */
 #pragma once
 
 #include "mbm.h"

@@ -1,6 +1,4 @@
-/* Draws the values of polled fields as a table that stays in its place.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Draws the values of polled fields as a table that stays in its place. */
 #include "live.h"
 
 #include "clock.h"

@@ -1,4 +1,4 @@
-/* mbm write: writes values. Licence: MIT OR Apache-2.0. */
+/* mbm write: writes values. */
 #include "advice.h"
 #include "device.h"
 #include "line.h"

@@ -1,6 +1,4 @@
-/* Parses a YAML file with libyaml, and checks its keys and values.
- *
- * Licence: MIT OR Apache-2.0. */
+/* Parses a YAML file with libyaml, and checks its keys and values. */
 #include "yaml_file.h"
 
 #include "numbers.h"

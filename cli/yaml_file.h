@@ -1,6 +1,4 @@
-/* A configuration file in YAML, read strictly: each refusal names the file and its line.
- *
- * Licence: MIT OR Apache-2.0. */
+/* A configuration file in YAML, read strictly: each refusal names the file and its line. */
 #pragma once
 
 #include <stddef.h>
