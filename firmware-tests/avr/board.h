@@ -1,7 +1,6 @@
 /* An AVR board in a cycle-accurate simulator, and the wires that end at it. All times are
  * CPU cycles, and none depends on the speed of the host. */
-#ifndef BOARD_H
-#define BOARD_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -76,5 +75,3 @@ uint16_t board_word(const board *b, uint16_t address);
  * grown below that place since. */
 void board_paint(board *b);
 unsigned board_stack_depth(const board *b);
-
-#endif

@@ -1,7 +1,6 @@
 /* A line between a board with a server and a libmodbus client: a pty whose bytes the
  * simulated wire carries. */
-#ifndef BUS_H
-#define BUS_H
+#pragma once
 
 #include "board.h"
 #include "pty.h"
@@ -43,5 +42,3 @@ void bus_settle(bus *l);
 /* With the board halted: sends a frame, good or bad. Returns whether a frame came back
  * within 100 ms of the board's time. */
 int bus_send(bus *l, const uint8_t *frame, size_t length);
-
-#endif

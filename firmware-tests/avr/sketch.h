@@ -1,7 +1,6 @@
 /* The boards that sketches are compiled for, the devices at their wires, and what tests observe of
  * a sketch: the text that it prints, and how often it switches a pin. */
-#ifndef SKETCH_H
-#define SKETCH_H
+#pragma once
 
 #include "board.h"
 #include "server.h"
@@ -63,5 +62,3 @@ uint16_t peer_value(unsigned address);
 /* A device without a context: answers every request with the right reply after one
  * millisecond. */
 void peer_right(wire *w, const uint8_t *frame, size_t length);
-
-#endif

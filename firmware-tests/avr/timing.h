@@ -1,7 +1,6 @@
 /* The measurements of the program `timing`, one function for each file. Each prints its
  * rows of docs/reports/timing.md. */
-#ifndef TIMING_H
-#define TIMING_H
+#pragma once
 
 #include "board.h"
 
@@ -60,5 +59,3 @@ unsigned rows_above(void);
 
 /* Ends the program, since the measurement cannot be right. */
 _Noreturn void give_up(const char *why);
-
-#endif

@@ -1,7 +1,6 @@
 /* A device for the examples of ModbusMaster: a libmodbus server that has every address which they
  * use, and what the board sent. */
-#ifndef UPSTREAM_DEVICE_H
-#define UPSTREAM_DEVICE_H
+#pragma once
 
 #include "board.h"
 #include "server.h"
@@ -29,5 +28,3 @@ void upstream_device_start(upstream_device *d, int unit);
 /* The device at a wire whose context is an upstream_device. It refuses 66 registers, as the
  * controller does that PhoenixContact_nanoLC is for. */
 void upstream_hear(wire *w, const uint8_t *frame, size_t length);
-
-#endif

@@ -1,7 +1,6 @@
 /* A device of the tests' own at the far end of a pty: unit 17 of the model. The line spoils
  * one of its replies. */
-#ifndef DEVICE_H
-#define DEVICE_H
+#pragma once
 
 #include "model.h"
 #include "pty.h"
@@ -39,5 +38,3 @@ typedef struct fault {
 
 extern const fault faults[];
 extern const unsigned fault_count;
-
-#endif

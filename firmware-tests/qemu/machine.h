@@ -1,6 +1,5 @@
 /* The machines that QEMU plays, and one run of the firmware on one of them. */
-#ifndef MACHINE_H
-#define MACHINE_H
+#pragma once
 
 #include <stdio.h>
 #include <sys/types.h>
@@ -36,5 +35,3 @@ int machine_says(const running *r, const char *text);
 
 running machine_start(const machine *m, const char *image, int line);
 run machine_finish(running *r, int patient);
-
-#endif

@@ -1,5 +1,5 @@
 """Tests of scripts that write or judge texts: scripts/check/functions, scripts/check/dependencies, scripts/check/real,
-packaging/debian/changelog, scripts/build/project.py, and packaging/sbom; and of the choice of the compiler
+packaging/debian/changelog, scripts/build/project.py, packaging/sbom, packaging/crates and scripts/check/steps; and of the choice of the compiler
 in scripts/build/archive. `make test-scripts` has the
 library for the SBOM."""
 import contextlib
@@ -7,6 +7,7 @@ import copy
 import importlib
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -727,6 +728,60 @@ class Real(unittest.TestCase):
         for arguments in ([], ["linux", "."], ["zephyr", ".", "uno"]):
             with self.subTest(arguments), unittest.mock.patch.object(sys, "argv", ["real", *arguments]):
                 self.assertRaises(SystemExit, real.main)
+
+
+# --- packaging/crates: the crate that is published
+
+INCLUDE = re.compile(r'include(?:_str|_bytes)?!\("([^"]+)"\)')
+
+
+class Crate(unittest.TestCase):
+    def test_it_has_every_file_that_its_sources_include(self):
+        with tempfile.TemporaryDirectory() as folder:
+            stage = pathlib.Path(folder, "stage")
+            subprocess.run(["packaging/crates/pack", "--stage", str(stage)], cwd=ROOT, check=True)
+            listed = subprocess.run(["cargo", "package", "--package=mbm", "--list", "--allow-dirty", "--offline"],
+                                    cwd=stage, check=True, capture_output=True, text=True).stdout.splitlines()
+        included = [((ROOT / name).parent / path).resolve().relative_to(ROOT).as_posix()
+                    for name in listed if name.endswith(".rs") for path in INCLUDE.findall((ROOT / name).read_text())]
+        self.assertIn("README.md", included)
+        self.assertEqual([path for path in included if path not in listed], [])
+
+
+# --- scripts/check/steps
+
+STEPS = ROOT / "scripts/check/steps"
+
+
+def run_steps(commands, *options):
+    done = subprocess.run([STEPS, *options, "name"], input="\n".join(commands) + "\n", stdout=subprocess.PIPE, text=True)
+    return done.returncode, done.stdout.splitlines()
+
+
+class Steps(unittest.TestCase):
+    def test_each_step_has_its_time_and_the_last_line_the_total(self):
+        code, lines = run_steps(["# a comment", "true", "sleep 1"])
+        self.assertEqual(code, 0)
+        self.assertRegex(lines[-2], r"^name: +[1-9]\d* s  sleep 1$")
+        self.assertRegex(lines[-1], r"^name: 2 steps, 0 failed, [1-9]\d* s$")
+
+    def test_the_first_failure_ends_it(self):
+        code, lines = run_steps(["false", "echo went on"])
+        self.assertEqual(code, 1)
+        self.assertNotIn("went on", lines)
+        self.assertIn("1 steps, 1 failed", lines[-1])
+
+    def test_it_may_keep_going_and_fails_at_the_end(self):
+        code, lines = run_steps(["false", "echo went on"], "--keep-going")
+        self.assertEqual(code, 1)
+        self.assertIn("went on", lines)
+        self.assertIn("2 steps, 1 failed", lines[-1])
+
+    def test_no_step_is_a_failure(self):
+        self.assertEqual(run_steps(["# nothing"])[0], 1)
+
+    def test_a_step_does_not_read_the_list(self):
+        self.assertIn("2 steps, 0 failed", run_steps(["cat", "true"])[1][-1])
 
 
 if __name__ == "__main__":

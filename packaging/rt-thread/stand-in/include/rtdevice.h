@@ -1,6 +1,5 @@
 /* See rtthread.h. Licence: MIT OR Apache-2.0. */
-#ifndef RTDEVICE_H
-#define RTDEVICE_H
+#pragma once
 
 #include <rtthread.h>
 
@@ -36,5 +35,3 @@ struct serial_configure {
 
 void rt_pin_mode(rt_base_t pin, rt_uint8_t mode);
 void rt_pin_write(rt_base_t pin, rt_ssize_t value);
-
-#endif

@@ -1,9 +1,6 @@
 /* See rtthread.h. Licence: MIT OR Apache-2.0. */
-#ifndef RTHW_H
-#define RTHW_H
+#pragma once
 
 #include <rtthread.h>
 
 void rt_hw_us_delay(rt_uint32_t micros);
-
-#endif

@@ -1,7 +1,6 @@
 /* Plays the parts of RT-Thread that mbm's port and example use, with the signatures of RT-Thread
  * 5. Licence: MIT OR Apache-2.0. */
-#ifndef RTTHREAD_H
-#define RTTHREAD_H
+#pragma once
 
 #include "rtconfig.h"
 #include <stddef.h>
@@ -46,5 +45,3 @@ rt_err_t rt_thread_mdelay(rt_int32_t milliseconds);
 #define rt_kprintf printf
 
 #define MSH_CMD_EXPORT(name, text) int (*const stand_in_command)(int, char **) = name
-
-#endif

@@ -1,7 +1,6 @@
 /* Plays the parts of ESP-IDF that mbm's port and example use, with the signatures of ESP-IDF 5.
  * Licence: MIT OR Apache-2.0. */
-#ifndef ESP_ERR_H
-#define ESP_ERR_H
+#pragma once
 
 void abort(void);
 
@@ -14,5 +13,3 @@ typedef int esp_err_t;
 #define ESP_ERR_TIMEOUT 0x107
 
 #define ESP_ERROR_CHECK(call) ((call) == ESP_OK ? (void)0 : abort())
-
-#endif

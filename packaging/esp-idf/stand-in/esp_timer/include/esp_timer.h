@@ -1,9 +1,6 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef ESP_TIMER_H
-#define ESP_TIMER_H
+#pragma once
 
 #include <stdint.h>
 
 int64_t esp_timer_get_time(void);
-
-#endif

@@ -1,6 +1,5 @@
 /* See kernel.h. Licence: MIT OR Apache-2.0. */
-#ifndef DEVICE_H
-#define DEVICE_H
+#pragma once
 
 #include "devicetree.h"
 #include <stdbool.h>
@@ -26,5 +25,3 @@ extern const struct device stand_in_uart, stand_in_gpio;
 #define stand_in_alias_modbus_line_current_speed STAND_IN_CURRENT_SPEED
 
 bool device_is_ready(const struct device *device);
-
-#endif

@@ -1,7 +1,6 @@
 /* Plays the parts of Zephyr that mbm's port and sample use, with the signatures of Zephyr 3.7.
  * Licence: MIT OR Apache-2.0. */
-#ifndef KERNEL_H
-#define KERNEL_H
+#pragma once
 
 #include <zephyr/device.h>
 
@@ -42,5 +41,3 @@ void k_spin_unlock(struct k_spinlock *lock, k_spinlock_key_t key);
 int k_sem_init(struct k_sem *sem, unsigned count, unsigned limit);
 void k_sem_give(struct k_sem *sem);
 int k_sem_take(struct k_sem *sem, k_timeout_t timeout);
-
-#endif

@@ -1,6 +1,5 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef FREERTOS_H
-#define FREERTOS_H
+#pragma once
 
 #include <stdint.h>
 
@@ -10,5 +9,3 @@ typedef struct QueueDefinition *QueueHandle_t;
 #define configTICK_RATE_HZ 100
 #define portTICK_PERIOD_MS ((TickType_t)1000 / configTICK_RATE_HZ)
 #define pdMS_TO_TICKS(milliseconds) ((TickType_t)(milliseconds)*configTICK_RATE_HZ / 1000)
-
-#endif

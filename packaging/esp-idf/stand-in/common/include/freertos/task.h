@@ -1,9 +1,6 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef TASK_H
-#define TASK_H
+#pragma once
 
 #include "freertos/FreeRTOS.h"
 
 void vTaskDelay(const TickType_t ticks);
-
-#endif

@@ -1,6 +1,5 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef GPIO_H
-#define GPIO_H
+#pragma once
 
 #include "esp_err.h"
 #include <stdint.h>
@@ -21,5 +20,3 @@ typedef struct {
 
 esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level);
 esp_err_t gpio_config(const gpio_config_t *config);
-
-#endif

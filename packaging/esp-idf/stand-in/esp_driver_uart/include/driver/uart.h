@@ -1,6 +1,5 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef UART_H
-#define UART_H
+#pragma once
 
 #include "esp_err.h"
 #include "freertos/FreeRTOS.h"
@@ -38,5 +37,3 @@ esp_err_t uart_set_rx_full_threshold(uart_port_t uart, int bytes);
 esp_err_t uart_wait_tx_done(uart_port_t uart, TickType_t ticks);
 int uart_write_bytes(uart_port_t uart, const void *bytes, size_t length);
 int uart_read_bytes(uart_port_t uart, void *bytes, uint32_t capacity, TickType_t ticks);
-
-#endif

@@ -1,6 +1,5 @@
 /* See kernel.h. Licence: MIT OR Apache-2.0. */
-#ifndef GPIO_H
-#define GPIO_H
+#pragma once
 
 #include <zephyr/device.h>
 
@@ -25,5 +24,3 @@ struct gpio_dt_spec {
 
 int gpio_pin_configure_dt(const struct gpio_dt_spec *pin, gpio_flags_t flags);
 int gpio_pin_set_dt(const struct gpio_dt_spec *pin, int value);
-
-#endif

@@ -1,6 +1,5 @@
 /* See kernel.h. Licence: MIT OR Apache-2.0. */
-#ifndef UART_H
-#define UART_H
+#pragma once
 
 #include <zephyr/device.h>
 
@@ -42,6 +41,4 @@ void uart_irq_tx_enable(const struct device *dev);
 void uart_irq_tx_disable(const struct device *dev);
 int uart_fifo_read(const struct device *dev, uint8_t *bytes, const int size);
 int uart_fifo_fill(const struct device *dev, const uint8_t *bytes, int size);
-#endif
-
 #endif

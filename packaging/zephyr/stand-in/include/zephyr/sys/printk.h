@@ -1,9 +1,6 @@
 /* See kernel.h. Licence: MIT OR Apache-2.0. */
-#ifndef PRINTK_H
-#define PRINTK_H
+#pragma once
 
 #include <stdio.h>
 
 #define printk printf
-
-#endif

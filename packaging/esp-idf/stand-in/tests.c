@@ -1,9 +1,9 @@
-/* In place of the example: the test kit for ports, whose sources come before, on the example's
- * line. Licence: MIT OR Apache-2.0. */
+/* In place of the example, on its line: the test kit for ports, if its sources come before; else
+ * the server of the component's tests. Licence: MIT OR Apache-2.0. */
+#include "../../../tests/late.h"
 #include "../../../tests/line.h"
 #include "mbm_esp_idf.h"
 #include "sdkconfig.h"
-#include "test_port.h"
 
 static mbm_port port;
 static mbm_espIdfLine line = {
@@ -15,6 +15,9 @@ static mbm_espIdfLine line = {
     .baud = CONFIG_METER_BAUD,
     .parity = UART_PARITY_EVEN,
 };
+
+#if defined MBM_PORTTEST_H
+#include "test_port.h"
 
 static uint8_t begin(void *context)
 {
@@ -29,3 +32,13 @@ void app_main(void)
     ESP_ERROR_CHECK(mbm_espIdf_open(&line, &port));
     test_port(&port, CONFIG_METER_BAUD, 0, begin);
 }
+#else
+void app_main(void)
+{
+    late_begin();
+    ESP_ERROR_CHECK(mbm_espIdf_open(&line, &port));
+    late_serve(&port, CONFIG_METER_BAUD);
+    for (;;)
+        mbm_espIdf_wait(late_poll());
+}
+#endif
