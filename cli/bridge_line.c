@@ -2,7 +2,7 @@
 #include "bridge_line.h"
 
 #include "clock.h"
-#include "device_file.h"
+#include "device.h"
 #include "device_plan.h"
 #include "discovery.h"
 #include "numbers.h"

@@ -4,6 +4,7 @@
 #include "conversion.h"
 #include "reach.h"
 #include "value.h"
+#include "yaml_file.h"
 
 /* What a field allows. */
 enum { DEVICE_READ = 1, DEVICE_WRITE = 2 };
@@ -74,6 +75,11 @@ typedef struct device {
     uint8_t notation; /* DEVICE_ON_WIRE, DEVICE_ONE_BASED or DEVICE_MODICON */
     reach reach;      /* what the device needs */
 } device;
+
+/* Reads a device file, of which docs/device-file.md describes every key. Returns CODE_DONE;
+ * device_free frees the device. Otherwise returns CODE_SYSTEM or CODE_WRONG, and sets `wrong` to a
+ * sentence without its full stop: "meter.yaml:12: ...". */
+int device_file_read(device *into, const char *path, char wrong[YAML_FILE_WRONG_BYTES]);
 
 /* Frees all that a device has. */
 void device_free(device *into);

@@ -1,6 +1,6 @@
 /* Reads the keys of a device file, each field with its value and enumeration, and refuses what
  * contradicts itself. */
-#include "device_file.h"
+#include "device.h"
 
 #include "device_keys.h"
 #include "report.h"

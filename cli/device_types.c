@@ -2,7 +2,7 @@
 #include "device_keys.h"
 
 #include "numbers.h"
-#include "value_dates.h"
+#include "value.h"
 
 #include <string.h>
 

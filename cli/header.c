@@ -1,7 +1,7 @@
 /* mbm header: writes the C header of a device for firmware, or a page about it. */
 #include "header.h"
 
-#include "device_file.h"
+#include "device.h"
 #include "device_plan.h"
 #include "names.h"
 #include "options.h"

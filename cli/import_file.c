@@ -2,7 +2,7 @@
  * the rest. */
 #include "import.h"
 
-#include "device_file.h"
+#include "device.h"
 #include "names.h"
 #include "numbers.h"
 #include "report.h"

@@ -8,7 +8,7 @@
 #include "place.h"
 #include "report.h"
 #include "trace.h"
-#include "value_dates.h"
+#include "value.h"
 
 #include <errno.h>
 #include <stdarg.h>

@@ -1,7 +1,7 @@
 /* mbm poll: reads the fields of a device file again and again. */
 #include "advice.h"
 #include "clock.h"
-#include "device_file.h"
+#include "device.h"
 #include "live.h"
 #include "numbers.h"
 #include "options.h"

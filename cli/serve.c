@@ -1,6 +1,6 @@
 /* mbm serve: a device from a file, one whose values vary, or one that holds what is written; on a
  * terminal, a pseudo terminal, a socket or a listener with connections. */
-#include "device_file.h"
+#include "device.h"
 #include "device_plan.h"
 #include "fault_port.h"
 #include "line.h"

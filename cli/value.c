@@ -3,7 +3,6 @@
 
 #include "decimal.h"
 #include "numbers.h"
-#include "value_dates.h"
 
 #include <ctype.h>
 #include <float.h>

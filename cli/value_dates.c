@@ -1,5 +1,5 @@
 /* Reads and writes dates as text, and converts them to the forms that registers have. */
-#include "value_dates.h"
+#include "value.h"
 
 #include "numbers.h"
 

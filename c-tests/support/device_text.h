@@ -4,7 +4,7 @@
 #ifndef DEVICE_TEXT_H
 #define DEVICE_TEXT_H
 
-#include "device_file.h"
+#include "device.h"
 #include "report.h"
 #include "test.h"
 
