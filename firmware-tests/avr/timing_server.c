@@ -124,7 +124,7 @@ static void is_answered(wire *w, const uint8_t *frame, size_t length)
 }
 
 /* Byte `i` of a kind of noise. */
-static uint8_t noise(unsigned kind, unsigned i)
+static uint8_t noise(unsigned which, unsigned i)
 {
     static const uint8_t request[8] = {1, 3, 0, 0, 0, 10, 0xC5, 0xCD};
     /* The start of a request that fills the buffer. */
@@ -132,7 +132,7 @@ static uint8_t noise(unsigned kind, unsigned i)
     static uint32_t random = 1;
 
     random = random * 1664525 + 1013904223;
-    switch (kind) {
+    switch (which) {
     case 0: return (uint8_t)(random >> 24);
     case 1: return 0;
     case 2: return request[i % 8]; /* requests without silence between them */
@@ -143,9 +143,9 @@ static uint8_t noise(unsigned kind, unsigned i)
 void time_server_flood(void)
 {
     span byte = {0}, deaf = {0};
-    unsigned kind, i;
+    unsigned which, i;
 
-    for (kind = 0; kind < KINDS; kind++) {
+    for (which = 0; which < KINDS; which++) {
         static flood f;
         uint8_t bytes[FULL + NOISE], request[FRAME] = {1, 3, 0, 0, 0, 10};
         uint16_t taken, before;
@@ -158,7 +158,7 @@ void time_server_flood(void)
         if (!board_run(f.on, 10 * MS))
             give_up("a sketch crashed");
         for (i = 0; i < sizeof bytes; i++)
-            bytes[i] = noise(kind, i);
+            bytes[i] = noise(which, i);
         wire_play(f.bus, MS, bytes, sizeof bytes);
         while (f.bus->bytes_received < FULL)
             if (!board_run(f.on, 100))
@@ -180,7 +180,7 @@ void time_server_flood(void)
             give_up("a sketch crashed");
         if (board_word(f.on, taken) != sizeof bytes + 8 || f.answers != 1)
             fprintf(stderr, "timing: after noise %u, %u bytes were taken, %u requests answered\n",
-                    kind, board_word(f.on, taken), f.answers);
+                    which, board_word(f.on, taken), f.answers);
         board_free(f.on);
     }
     row_cycles("a server: a byte of noise without silence (one lasts 1388 at 115200 baud)", &byte,

@@ -147,3 +147,23 @@ run machine_run(const machine *m, int line)
 
     return machine_finish(&r, 1);
 }
+
+int machine_each(int argc, char **argv, int (*test)(const machine *m))
+{
+    int failed = 0, asked = 0, a;
+    unsigned m;
+
+    for (m = 0; m < machine_count; m++) {
+        int wanted = argc == 1;
+
+        for (a = 1; a < argc; a++)
+            wanted |= strcmp(argv[a], machines[m].name) == 0;
+        if (wanted) {
+            failed += test(&machines[m]);
+            asked++;
+        }
+    }
+    if (asked == 0)
+        fprintf(stderr, "%s: no such machine\n", argv[0]);
+    return failed != 0 || asked == 0;
+}

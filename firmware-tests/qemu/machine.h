@@ -35,3 +35,7 @@ int machine_says(const running *r, const char *text);
 
 running machine_start(const machine *m, const char *image, int line);
 run machine_finish(running *r, int patient);
+
+/* Calls `test` for each machine that the command line names, or for all. Returns the exit code of
+ * the program: 0 if there is such a machine and each test returned 0. */
+int machine_each(int argc, char **argv, int (*test)(const machine *m));

@@ -65,25 +65,16 @@ static void the_port_passes(void **state)
     assert_non_null(strstr(done.console, "the port passes"));
 }
 
-int main(int argc, char **argv)
+static int test_machine(const machine *m)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_port_passes)};
-    int failed = 0, asked = 0, a;
-    unsigned m;
 
-    for (m = 0; m < machine_count; m++) {
-        int wanted = argc == 1;
+    board = m;
+    alarm(300);
+    return cmocka_run_group_tests_name(m->name, tests, start, stop);
+}
 
-        for (a = 1; a < argc; a++)
-            wanted |= strcmp(argv[a], machines[m].name) == 0;
-        if (!wanted)
-            continue;
-        board = &machines[m];
-        alarm(300);
-        failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
-        asked++;
-    }
-    if (asked == 0)
-        fprintf(stderr, "test_porttest: no such machine\n");
-    return failed != 0 || asked == 0;
+int main(int argc, char **argv)
+{
+    return machine_each(argc, argv, test_machine);
 }

@@ -363,20 +363,5 @@ static int test_machine(const machine *m)
 
 int main(int argc, char **argv)
 {
-    int failed = 0, asked = 0, a;
-    unsigned m;
-
-    for (m = 0; m < machine_count; m++) {
-        int wanted = argc == 1;
-
-        for (a = 1; a < argc; a++)
-            wanted |= strcmp(argv[a], machines[m].name) == 0;
-        if (wanted) {
-            failed += test_machine(&machines[m]);
-            asked++;
-        }
-    }
-    if (asked == 0)
-        fprintf(stderr, "test_qemu: no such machine\n");
-    return failed != 0 || asked == 0;
+    return machine_each(argc, argv, test_machine);
 }

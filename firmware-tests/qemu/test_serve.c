@@ -233,7 +233,7 @@ static void the_firmware_ends_when_its_coil_is_set(void **state)
     assert_non_null(strstr(done.console, "serving"));
 }
 
-int main(int argc, char **argv)
+static int test_machine(const machine *m)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(registers_are_written_and_read),
@@ -243,24 +243,17 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_broadcast_is_carried_out_without_a_response),
         cmocka_unit_test(the_firmware_ends_when_its_coil_is_set),
     };
-    int failed = 0, asked = 0, a;
-    unsigned m;
 
-    for (m = 0; m < machine_count; m++) {
-        /* The image with the client is for the same machine, so it is left out. */
-        int wanted = argc == 1 && !strstr(machines[m].name, "-client");
+    /* The image with the client is for the same machine, so it is left out. */
+    if (strstr(m->name, "-client"))
+        return 0;
+    board = m;
+    /* In case all other time limits fail: ends this program, and QEMU with it. */
+    alarm(900);
+    return cmocka_run_group_tests_name(m->name, tests, start, stop);
+}
 
-        for (a = 1; a < argc; a++)
-            wanted |= strcmp(argv[a], machines[m].name) == 0;
-        if (!wanted)
-            continue;
-        board = &machines[m];
-        /* In case all other time limits fail: ends this program, and QEMU with it. */
-        alarm(900);
-        failed += cmocka_run_group_tests_name(board->name, tests, start, stop);
-        asked++;
-    }
-    if (asked == 0)
-        fprintf(stderr, "test_serve: no such machine\n");
-    return failed != 0 || asked == 0;
+int main(int argc, char **argv)
+{
+    return machine_each(argc, argv, test_machine);
 }
