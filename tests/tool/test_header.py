@@ -89,7 +89,8 @@ def described(file):
     for field in fields:
         value = field["value"]
         field["value"] = value == "on" if value in ("on", "off") else value if field["type"] == "text" else json.loads(value)
-    return fields
+        field["times"] = int(re.search(r"count: (\d+)|$", field.get("repeat", ""))[1] or 1)
+    return [{**field, "name": field["name"].replace("{n}", str(n + 1))} for field in fields for n in range(field["times"])]
 
 
 @each({file: name for file, name in DEVICES.items() if file != CELLS})
