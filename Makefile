@@ -29,10 +29,11 @@ TLS_TESTS := $(filter test_tls%,$(TESTS))
 # The test kit for ports, and its own tests.
 PORT_KIT := $(patsubst ports/%.c,%,$(wildcard ports/test/mbm_porttest*.c))
 FREERTOS_TESTS := $(filter test_freertos% test_porttest_freertos,$(TESTS))
-LWIP_TESTS := $(filter test_lwip% test_porttest_lwip,$(TESTS))
+LWIP_TESTS := $(filter test_lwip% test_porttest_lwip%,$(TESTS))
 LWIP_SOCKETS := over_lwip/mbm_tcp over_lwip/mbm_tcp_listener lwip/mbm_lwip_sockets lwip/serve_sockets lwip/client_sockets
 # Those with lwIP's own thread, and a relay to the machine. The others have a wire in memory.
-LWIP_RELAY_TESTS := $(filter test_lwip_task test_lwip_sockets test_porttest_lwip,$(LWIP_TESTS))
+LWIP_RELAY_TESTS := $(filter test_lwip_task test_lwip_sockets test_porttest_lwip%,$(LWIP_TESTS))
+LWIP_SOCKET_TESTS := $(filter %_lwip_sockets,$(LWIP_TESTS))
 LWIP_WIRE_TESTS := $(filter-out $(LWIP_RELAY_TESTS),$(LWIP_TESTS))
 STM32_TESTS := $(filter test_stm32% test_porttest_stm32,$(TESTS))
 PICO_TESTS := $(filter test_pico test_porttest_pico,$(TESTS))
@@ -41,6 +42,7 @@ BARE_UARTS := $(filter-out simcall,$(patsubst ports/baremetal/uart/%.c,%,$(wildc
 # The board that plays Zephyr for the module's own tests, and its wire.
 ZEPHYR_TESTS := $(filter test_zephyr%,$(TESTS))
 ZEPHYR_STAND_IN := packaging/zephyr/stand-in
+WIZNET_TESTS := $(filter test_wiznet test_porttest_wiznet,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
@@ -332,8 +334,8 @@ $(BUILD)/$(1)/baremetal/%.o: ports/baremetal/uart/%.c
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -DPREFIX=u_$$* -include c-tests/baremetal/registers.h -c $$< -o $$@
 $(BUILD)/$(1)/test_baremetal: $(patsubst %,$(BUILD)/$(1)/baremetal/%.o,$(BARE_UARTS))
 $(BUILD)/$(1)/test_baremetal: INCLUDES := -Ic-tests/baremetal -Iports/baremetal $(INCLUDES)
-$(BUILD)/$(1)/test_wiznet: $(patsubst %,$(BUILD)/$(1)/wiznet/%.o,chip_model mbm_wiznet)
-$(BUILD)/$(1)/test_wiznet: INCLUDES += -Ic-tests/wiznet -Iports/wiznet
+$(WIZNET_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/wiznet/%.o,chip_model mbm_wiznet)
+$(WIZNET_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/wiznet -Iports/wiznet
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip
@@ -346,10 +348,10 @@ $(patsubst %,$(BUILD)/$(1)/lwip/%.o,client serve): INCLUDES += -Dmain=example_$$
 $(BUILD)/$(1)/over_lwip/%.o: ports/linux/%.c
 	@mkdir -p $$(@D)
 	@$(2) $(DEPENDS) $(CFLAGS) $(4) $(WARNINGS) $$(INCLUDES) -c $$< -o $$@
-$(BUILD)/$(1)/test_lwip_sockets: $(LWIP_SOCKETS:%=$(BUILD)/$(1)/%.o)
+$(LWIP_SOCKET_TESTS:%=$(BUILD)/$(1)/%): $(LWIP_SOCKETS:%=$(BUILD)/$(1)/%.o)
 # Set for each object: what is set for the program holds for Linux's objects too.
-$(patsubst %,$(BUILD)/$(1)/%.o,test_lwip_sockets $(LWIP_SOCKETS)): INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
-$(BUILD)/$(1)/test_lwip_sockets: WITHOUT = $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/linux/*.c)) $(BUILD)/$(1)/support/tcp_waiting.o
+$(patsubst %,$(BUILD)/$(1)/%.o,$(LWIP_SOCKET_TESTS) $(LWIP_SOCKETS)): INCLUDES += -DMBM_TCP_OVER_LWIP -Iexamples/lwip
+$(LWIP_SOCKET_TESTS:%=$(BUILD)/$(1)/%): WITHOUT = $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/linux/*.c)) $(BUILD)/$(1)/support/tcp_waiting.o
 $(PORT_TESTS:%=$(BUILD)/$(1)/%): $(PORT_KIT:%=$(BUILD)/$(1)/%.o)
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(wildcard ports/freertos/*.c)) $(BUILD)/$(1)/freertos/uart.o
 $(FREERTOS_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/freertos

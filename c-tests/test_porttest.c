@@ -103,6 +103,16 @@ static model_uart over_usb(void)
     return uart;
 }
 
+/* Blocks of any length, no rate, and a far end that may close. */
+static model_uart over_socket(void)
+{
+    model_uart uart = over_usb();
+
+    uart.block = uart.txBuffer;
+    uart.isSocket = uart.holdsBack = 1;
+    return uart;
+}
+
 /* Begins the model and a test that uses all it has. */
 static void prepare(model_uart uart, int driver)
 {
@@ -118,7 +128,10 @@ static void prepare(model_uart uart, int driver)
     k.test.say = hear;
     k.test.lost = model_lost;
     k.test.begin = model_again;
-    k.test.disturb = model_disturb;
+    if (uart.isSocket)
+        k.test.hangUp = model_hangUp;
+    else
+        k.test.disturb = model_disturb;
     k.test.context = &k.uart;
     if (driver || uart.ownDriver)
         k.test.driver = model_driver;
@@ -137,7 +150,9 @@ static void run_right(model_uart uart, int driver)
 /* What a fault needs to show. */
 static model_uart broken(model_fault fault)
 {
-    model_uart uart = fault == FULL_BLOCKS ? with_dma() : with_interrupt();
+    model_uart uart = fault == FULL_BLOCKS     ? with_dma()
+                      : fault >= CLOSED_SILENT ? over_socket()
+                                               : with_interrupt();
 
     uart.fault = fault;
     uart.ownDriver = fault == DRIVER_EARLY;
@@ -372,6 +387,17 @@ TEST_ROW(
         ERROR_NEGATIVE,
         "`read` was negative after an error on the line: that means that the link is lost. Clear the error and return the bytes that have come, or 0."))
 
+TEST_ROW(
+    a_closed_connection_that_looks_like_a_silent_device,
+    finds(
+        CLOSED_SILENT,
+        "`read` returned 0 for a second after the far end had closed the connection, as if the device were silent. Return a negative number at the end of the stream."))
+TEST_ROW(
+    a_closed_connection_that_no_second_begin_replaces,
+    finds(
+        CLOSED_FOR_EVER,
+        "After the far end had closed the connection, `begin` did not make one that carries bytes: close the socket, and open a new one."))
+
 TEST(a_hook_that_is_missing)
 {
     prepare(with_interrupt(), 1);
@@ -509,6 +535,36 @@ TEST(a_port_over_usb_passes)
     says(MBM_PORT_FACT, "Bytes arrive in blocks of up to 64.");
     says(MBM_PORT_LEFT_OUT,
          "Whether `flush` is exact was not measured: set `baud`, if the line has a rate.");
+}
+
+/* It needs no flush, and the test says which checks it left out. */
+TEST(a_port_over_a_socket_passes)
+{
+    run_right(over_socket(), 0);
+    assert_int_equal(k.test.advice, 0);
+    says(
+        MBM_PORT_LEFT_OUT,
+        "Whether `flush` is missing was not judged: a socket or USB needs none. Set `baud`, if the line has a rate.");
+    says(MBM_PORT_LEFT_OUT,
+         "The pin of a driver was not looked at: set `driver`, if there is one.");
+    says(
+        MBM_PORT_LEFT_OUT,
+        "No error on the line was tried: set `disturb` to a function that makes one, such as a break, if the line can have one.");
+    assert_int_equal(k.test.leftOut, 3);
+    prepare(over_socket(), 0);
+    k.test.hangUp = NULL;
+    assert_int_equal(mbm_portTest_run(&k.test), 0);
+    says(
+        MBM_PORT_LEFT_OUT,
+        "No connection was closed: set `hangUp` to a function that closes one at its far end, if the line is a connection.");
+}
+
+TEST(a_uart_without_a_flush_gets_advice)
+{
+    run_right(broken(NO_FLUSH), 0);
+    says(
+        MBM_PORT_ADVICE,
+        "The port has no `flush`: a response timeout gets the time of the request's characters on top.");
 }
 
 TEST(a_line_that_holds_the_sender_back_loses_nothing)
@@ -735,7 +791,7 @@ TEST(the_output_on_the_page)
         "fact: Bytes arrive in blocks of up to 1, at most % us late: no setting of mbm needs a change.",
         "advice: 299 of 556 bytes were lost, and no counter said so: count them (mbm_ring_lost does), and set `lost`.",
         "left out: The port was not begun a second time: set `begin`.",
-        "left out: No error on the line was tried: set `disturb` to a function that makes one, such as a break.",
+        "left out: No error on the line was tried: set `disturb` to a function that makes one, such as a break, if the line can have one.",
     };
 
     prepare(broken(FLUSH_EARLY), 0);

@@ -60,20 +60,38 @@ TEST(the_port_of_a_terminal)
 
 /* --- TCP */
 
-TEST(the_port_of_a_tcp_connection)
+static mbm_tcp_listener listener;
+static mbm_tcp server, client;
+
+/* Connects, and again. */
+static uint8_t connect_again(void *context)
 {
-    static mbm_tcp_listener listener;
-    static mbm_tcp server, client;
     static mbm_tcp_addresses addresses;
     char service[8];
 
-    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    mbm_tcp_close(&client);
+    mbm_tcp_close(&server);
     snprintf(service, sizeof service, "%u", listener.port);
-    assert_int_equal(mbm_tcp_open(&client, &addresses, "127.0.0.1", service), 0);
+    if (mbm_tcp_open(&client, &addresses, "127.0.0.1", service) != 0)
+        return 1;
     AWAIT(mbm_tcp_accept(&listener, &server, 1) >= 0);
+    return 0;
+}
+
+static void hang_up(void *context)
+{
+    mbm_tcp_close(&server);
+}
+
+TEST(the_port_of_a_tcp_connection)
+{
+    assert_int_equal(mbm_tcp_listen(&listener, "127.0.0.1", "0"), 0);
+    assert_int_equal(connect_again(NULL), 0);
     near_port = mbm_tcp_port(&client);
     far_port = mbm_tcp_port(&server);
     test.holds = 256;
+    test.begin = connect_again;
+    test.hangUp = hang_up;
     passes();
     mbm_tcp_close(&client);
     mbm_tcp_close(&server);

@@ -30,6 +30,11 @@ static uint8_t begin(void *context)
     return 0;
 }
 
+static void hang_up(void *context)
+{
+    mbm_lwip_close(&far_end);
+}
+
 TEST(the_port_passes_the_test_kit)
 {
     static mbm_portTest test;
@@ -44,6 +49,7 @@ TEST(the_port_passes_the_test_kit)
     test.other = &far_port;
     test.reference = raw_micros;
     test.begin = begin;
+    test.hangUp = hang_up;
     test.yield = yield;
     test.say = porttest_say;
     test.holds = 256;

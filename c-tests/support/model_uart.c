@@ -12,6 +12,7 @@ void model_begin(model_uart *m)
     m->next = m->now;
     m->first = m->leavingCount = m->pendingCount = m->heldCount = 0;
     m->isDeaf = m->fault == DEAF;
+    m->isClosed = 0;
     m->isOn = m->fault == DRIVER_INVERTED;
     if (m->wire == NULL)
         m->wire = m;
@@ -117,6 +118,8 @@ static int16_t port_read(void *context, uint8_t *bytes, uint16_t capacity)
         m->isBroken = 0;
         return -1;
     }
+    if (m->isClosed && m->heldCount == 0)
+        return (int16_t)(m->fault == CLOSED_SILENT ? 0 : -1);
     if (m->fault == READ_OVERFLOWS && m->heldCount < 60)
         count = m->heldCount;
     if (m->heldCount == 0) {
@@ -235,7 +238,7 @@ mbm_port model_port(model_uart *m, int driver)
                      .read = port_read,
                      .write = port_write,
                      .micros = port_micros,
-                     .flush = m->fault == NO_FLUSH ? NULL : port_flush,
+                     .flush = m->isSocket || m->fault == NO_FLUSH ? NULL : port_flush,
                      .idle = port_idle};
 
     if (driver) {
@@ -261,7 +264,7 @@ uint8_t model_again(void *context)
 {
     model_uart *m = called(context);
 
-    if (m->fault == BEGIN_FAILS)
+    if (m->fault == BEGIN_FAILS || (m->isClosed && m->fault == CLOSED_FOR_EVER))
         return 1;
     model_begin(m);
     if (m->fault == BEGIN_DEAF)
@@ -278,6 +281,11 @@ void model_disturb(void *context)
     m->isBroken = 1;
     if (m->fault == ERROR_DEAF)
         m->isDeaf = 1;
+}
+
+void model_hangUp(void *context)
+{
+    called(context)->isClosed = 1;
 }
 
 uint32_t model_reference(void *context)

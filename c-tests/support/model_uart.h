@@ -45,9 +45,11 @@ typedef enum model_fault {
     IDLE_TOO_LONG, /* a tick of 10 ms, always */
     IDLE_DEAF,     /* sleeps for pollDelay, whatever comes */
     BEGIN_FAILS,
-    BEGIN_DEAF,     /* a second begin leaves reception off */
-    ERROR_DEAF,     /* as OVERRUN_DEAF, of a framing error */
-    ERROR_NEGATIVE, /* a framing error is a lost link */
+    BEGIN_DEAF,      /* a second begin leaves reception off */
+    ERROR_DEAF,      /* as OVERRUN_DEAF, of a framing error */
+    ERROR_NEGATIVE,  /* a framing error is a lost link */
+    CLOSED_SILENT,   /* 0 after the far end has closed the connection */
+    CLOSED_FOR_EVER, /* a second begin does not close the socket, and fails */
     FAULTS
 } model_fault;
 
@@ -63,6 +65,7 @@ typedef struct model_uart {
     uint16_t block;     /* the receiver hands over so many bytes at once; 1: each */
     uint32_t idleChars; /* after this silence, in characters, it hands over fewer */
     uint8_t ownDriver;  /* the UART switches the driver itself */
+    uint8_t isSocket;   /* a connection, which its far end may close; it has no flush */
     uint8_t holdsBack;  /* the sender waits while the receiver is full, as over USB and TCP */
     uint32_t awayCalls; /* at each such number of calls the task is away */
     uint64_t awayNs;    /* for so long; the UART works on */
@@ -76,7 +79,7 @@ typedef struct model_uart {
     uint16_t first, leavingCount, pendingCount, heldCount;
     uint64_t arrivedAt;
     uint32_t lost, characters, calls;
-    uint8_t isOn, isDeaf, isUsed, isBroken, last;
+    uint8_t isOn, isDeaf, isUsed, isBroken, isClosed, last;
     struct model_uart *wire; /* who receives; itself for a loop */
 } model_uart;
 
@@ -90,6 +93,7 @@ uint32_t model_lost(void *context);
 uint8_t model_driver(void *context);
 uint8_t model_again(void *context);
 void model_disturb(void *context);
+void model_hangUp(void *context);
 uint32_t model_reference(void *context);
 
 #endif

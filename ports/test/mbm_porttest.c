@@ -157,9 +157,9 @@ static void clear(mbm_portTest *test)
 uint16_t mbm_portTest_run(mbm_portTest *test)
 {
     static void (*const checks[])(mbm_portTest *) = {
-        mbm_portTest_checkRead,     mbm_portTest_checkWrite, mbm_portTest_checkFlush,
-        mbm_portTest_checkWire,     mbm_portTest_checkIdle,  mbm_portTest_checkBegin,
-        mbm_portTest_checkDisturbed};
+        mbm_portTest_checkRead,      mbm_portTest_checkWrite, mbm_portTest_checkFlush,
+        mbm_portTest_checkWire,      mbm_portTest_checkIdle,  mbm_portTest_checkBegin,
+        mbm_portTest_checkDisturbed, mbm_portTest_checkHangUp};
     uint8_t i;
 
     if (test == NULL || test->port == NULL)
@@ -172,7 +172,7 @@ uint16_t mbm_portTest_run(mbm_portTest *test)
     mbm_portTest_checkClock(test, 100);
     for (i = 0; i < sizeof checks / sizeof *checks && !test->isOver; i++)
         checks[i](test);
-    if (test->isOver)
+    if (i < sizeof checks / sizeof *checks)
         SAY(test, MBM_PORT_LEFT_OUT, "The checks that follow were not made.");
     return test->wrong;
 }

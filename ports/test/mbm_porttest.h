@@ -77,6 +77,8 @@ typedef struct mbm_portTest {
     uint8_t (*begin)(void *context);
     /** Makes the receiver see an error: a break, a byte at another rate or with another parity. */
     void (*disturb)(void *context);
+    /** Closes the connection at its far end. For a port over a socket. */
+    void (*hangUp)(void *context);
     /** A second clock, in microseconds, that is known to be right. */
     uint32_t (*reference)(void *context);
     /** Called again and again while the test waits. Runs what the port needs, as the loop of lwIP

@@ -268,6 +268,10 @@ void mbm_portTest_checkFlush(mbm_portTest *test)
         SAY(test, MBM_PORT_WRONG,
             "The port switches a driver and has no `flush`: the driver goes off before the bytes have left. Set "
             "`flush` to a function that returns 1 after the last bit.");
+    else if (port->flush == NULL && test->baud == 0)
+        SAY(test, MBM_PORT_LEFT_OUT,
+            "Whether `flush` is missing was not judged: a socket or USB needs none. Set `baud`, if the line has a "
+            "rate.");
     else if (port->flush == NULL)
         SAY(test, MBM_PORT_ADVICE,
             "The port has no `flush`: a response timeout gets the time of the request's characters on top.");

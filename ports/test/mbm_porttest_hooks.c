@@ -1,5 +1,5 @@
-/* The test of a port: its clock, an empty read, idle, a second start, an error on the line.
- * Licence: MIT OR Apache-2.0. */
+/* The test of a port: its clock, an empty read, idle, a second start, an error on the line, a
+ * closed connection. See mbm_porttest.h. Licence: MIT OR Apache-2.0. */
 #include "mbm_porttest_parts.h"
 
 /* A clock that returns the same time in this number of reads stands still. Even on a fast
@@ -305,7 +305,7 @@ void mbm_portTest_checkIdle(mbm_portTest *test)
         check_wakeup(test, away);
 }
 
-/* --- a second start, and an error on the line */
+/* --- a second start, an error on the line, and the end of a connection */
 
 void mbm_portTest_checkBegin(mbm_portTest *test)
 {
@@ -340,7 +340,8 @@ void mbm_portTest_checkDisturbed(mbm_portTest *test)
         return;
     if (test->disturb == NULL) {
         SAY(test, MBM_PORT_LEFT_OUT,
-            "No error on the line was tried: set `disturb` to a function that makes one, such as a break.");
+            "No error on the line was tried: set `disturb` to a function that makes one, such as a break, if the line "
+            "can have one.");
         return;
     }
     test->checks++;
@@ -361,4 +362,43 @@ void mbm_portTest_checkDisturbed(mbm_portTest *test)
     SAY(test, MBM_PORT_WRONG,
         "After an error on the line bytes do not arrive as they were sent: clear the flags of framing, noise, "
         "parity and overrun, and start reception again in the error callback.");
+}
+
+/* Reads what was left. Returns whether the end of the connection shows within a second. */
+static uint8_t shows_the_end(mbm_portTest *test)
+{
+    const mbm_port *port = test->port;
+    const uint32_t began = mbm_portTest_now(test);
+    uint8_t byte;
+
+    while (port->read(port->context, &byte, 1) >= 0) {
+        if (mbm_portTest_since(test, began) > 1000000u)
+            return 0;
+        mbm_portTest_yield(test);
+    }
+    return 1;
+}
+
+void mbm_portTest_checkHangUp(mbm_portTest *test)
+{
+    if (!mbm_portTest_has_wire(test))
+        return;
+    if (test->hangUp == NULL) {
+        if (test->baud == 0)
+            SAY(test, MBM_PORT_LEFT_OUT,
+                "No connection was closed: set `hangUp` to a function that closes one at its far end, if the line is "
+                "a connection.");
+        return;
+    }
+    test->checks++;
+    test->hangUp(test->context);
+    if (!shows_the_end(test))
+        SAY(test, MBM_PORT_WRONG,
+            "`read` returned 0 for a second after the far end had closed the connection, as if the device were "
+            "silent. Return a negative number at the end of the stream.");
+    else if (test->begin != NULL &&
+             (test->begin(test->context) != 0 || (!mbm_portTest_is_alive(test) && !test->isOver)))
+        SAY(test, MBM_PORT_WRONG,
+            "After the far end had closed the connection, `begin` did not make one that carries bytes: close the "
+            "socket, and open a new one.");
 }

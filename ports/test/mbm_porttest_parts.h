@@ -127,5 +127,6 @@ void mbm_portTest_checkRead(mbm_portTest *test);
 void mbm_portTest_checkIdle(mbm_portTest *test);
 void mbm_portTest_checkBegin(mbm_portTest *test);
 void mbm_portTest_checkDisturbed(mbm_portTest *test);
+void mbm_portTest_checkHangUp(mbm_portTest *test);
 
 #endif
