@@ -300,8 +300,9 @@ TEST(a_client_of_libmodbus_more_than_places_is_refused_and_the_others_go_on)
         peers[i] = libmodbus_connect();
         assert_int_equal(modbus_read_registers(peers[i], 3, 1, got), 1);
     }
-    more = libmodbus_connect();
-    assert_int_equal(modbus_read_registers(more, 3, 1, got), -1);
+    more = tcp_clientOf(to_server(), 1);
+    /* The reset may come before libmodbus has seen that it is connected. */
+    assert_true(modbus_connect(more) != 0 || modbus_read_registers(more, 3, 1, got) == -1);
     for (i = 0; i < PLACES; i++) {
         assert_int_equal(modbus_read_registers(peers[i], 3, 1, got), 1);
         modbus_close(peers[i]);
