@@ -216,7 +216,7 @@ TEST(a_wait_ends_when_bytes_come_and_when_the_time_is_over)
 }
 
 /* lwIP would send the bytes for minutes otherwise. */
-TEST(a_request_without_an_answer_is_given_up_with_its_connection)
+static void is_given_up_by(void (*leave)(void *context))
 {
     mbm_tcp_listener listener = MBM_INIT;
     mbm_tcp place = MBM_INIT, client = MBM_INIT;
@@ -237,11 +237,44 @@ TEST(a_request_without_an_answer_is_given_up_with_its_connection)
         assert_true(taken >= 0);
         sum += taken;
     }
-    mbm_tcp_disconnect(&client);
+    leave(&client);
     AWAIT((taken = mbm_tcp_port(&place).read(&place, into, sizeof into),
            got += taken > 0 ? taken : 0, taken < 0));
     assert_true(got < sum);
     mbm_tcp_close(&client);
+    mbm_tcp_close(&place);
+    mbm_tcp_closeListener(&listener);
+}
+
+static void close_client(void *context)
+{
+    mbm_tcp_close(context);
+}
+
+TEST_ROW(a_request_without_an_answer_is_given_up_by_a_disconnect,
+         is_given_up_by(mbm_tcp_disconnect))
+TEST_ROW(a_request_without_an_answer_is_given_up_by_a_close, is_given_up_by(close_client))
+
+TEST(a_connection_whose_request_was_answered_ends_without_a_reset)
+{
+    mbm_tcp_listener listener = MBM_INIT;
+    mbm_tcp place = MBM_INIT, client = MBM_INIT;
+    mbm_tcp_addresses addresses;
+    const mbm_port near_end = mbm_tcp_port(&client), far_end = mbm_tcp_port(&place);
+    uint8_t byte = 7;
+
+    assert_int_equal(mbm_tcp_listen(&listener, NULL, "1600"), 0);
+    assert_int_equal(mbm_tcp_open(&client, &addresses, "127.0.0.1", "1600"), 0);
+    AWAIT(mbm_tcp_accept(&listener, &place, 1) == 0);
+    AWAIT(mbm_tcp_isConnected(&client) == 1);
+    assert_int_equal(near_end.write(&client, &byte, 1), 1);
+    AWAIT(far_end.read(&place, &byte, 1) == 1);
+    assert_int_equal(far_end.write(&place, &byte, 1), 1);
+    AWAIT(near_end.read(&client, &byte, 1) == 1);
+    poll(NULL, 0, 30);
+    mbm_tcp_close(&client);
+    AWAIT(far_end.read(&place, &byte, 1) < 0);
+    assert_int_equal(place.error, EPIPE);
     mbm_tcp_close(&place);
     mbm_tcp_closeListener(&listener);
 }

@@ -29,10 +29,17 @@ static inline int mbm_tcp_pollFor(struct pollfd *waits, nfds_t count, uint32_t t
     return ppoll(waits, count, &(struct timespec){0, (long)timeoutUs * 1000}, NULL);
 }
 
-/* Linux gives up by itself what a peer does not acknowledge: TCP_USER_TIMEOUT. */
-static inline void mbm_tcp_noteWritten(mbm_tcp *tcp)
+/* The number of bytes that the peer has not acknowledged. */
+static inline uint32_t mbm_tcp_unacknowledged(const mbm_tcp *tcp)
 {
-    (void)tcp;
+    int count = 0;
+
+    return ioctl(tcp->fd, TIOCOUTQ, &count) == 0 && count > 0 ? (uint32_t)count : 0;
+}
+
+static inline void mbm_tcp_noteWritten(mbm_tcp *tcp, uint16_t count)
+{
+    tcp->lastWrite = count;
 }
 
 static inline void mbm_tcp_noteRead(mbm_tcp *tcp)
@@ -40,7 +47,7 @@ static inline void mbm_tcp_noteRead(mbm_tcp *tcp)
     (void)tcp;
 }
 
-static inline void mbm_tcp_dropUnsent(mbm_tcp *tcp)
+static inline void mbm_tcp_noteFailed(mbm_tcp *tcp)
 {
     (void)tcp;
 }
@@ -66,6 +73,10 @@ enum { FREE, CONNECTING, CONNECTED, LOST };
 /* The link is lost if the peer sends nothing for IDLE_S and then answers none of the probes, or
  * if it does not acknowledge a sent byte for UNACKNOWLEDGED_MS. */
 enum { IDLE_S = 15, PROBE_INTERVAL_S = 5, PROBE_COUNT = 3, UNACKNOWLEDGED_MS = 30000 };
+
+/* A write that is as recent at the end of its connection is no request that was given up: it is the
+ * alert that ends a TLS session, or a request without a reply. */
+enum { JUST_WRITTEN_US = 20000 };
 
 /* The sleep after poll has failed. */
 enum { POLL_RETRY_US = 10000 };
@@ -132,10 +143,48 @@ static void remove_from_ready(mbm_tcp *tcp)
     tcp->readiness = 0;
 }
 
+static void set(int fd, int level, int option, const void *value, socklen_t size)
+{
+    /* A socket of another family, without the option, works too. */
+    (void)setsockopt(fd, level, option, value, size);
+}
+
+static void set_number(int fd, int level, int option, int value)
+{
+    set(fd, level, option, &value, sizeof value);
+}
+
+/* Whether a client's connection has bytes of a request that was given up. A response of a server is
+ * still sent. */
+static int has_given_up(const mbm_tcp *tcp)
+{
+    const uint32_t count =
+        tcp->addresses && tcp->state == CONNECTED ? mbm_tcp_unacknowledged(tcp) : 0;
+
+    return count > tcp->lastWrite ||
+           (count > 0 && mbm_tcp_microseconds() - tcp->lastActivityUs >= JUST_WRITTEN_US);
+}
+
+/* Makes the close of a socket a reset if it has bytes of a request that was given up. The system
+ * would send them for up to UNACKNOWLEDGED_MS after the close, lwIP for minutes, and a write that
+ * failed would be carried out then. */
+COLD static void drop_given_up(const mbm_tcp *tcp)
+{
+    struct linger now;
+
+    if (!has_given_up(tcp))
+        return;
+    now.l_onoff = 1;
+    now.l_linger = 0;
+    set(tcp->fd, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+}
+
 /* Enters a state without a socket. */
 static void leave_socket(mbm_tcp *tcp, uint8_t state, int error)
 {
     const int fd = has_socket(tcp) ? tcp->fd : -1;
+
+    drop_given_up(tcp);
 
     mbm_tcp_setEvents(tcp, 0);
     tcp->state = state;
@@ -188,25 +237,19 @@ static inline void note_activity(mbm_tcp *tcp)
         tcp->lastActivityUs = (tcp->set ? tcp->set->nowMs : mbm_tcp_milliseconds()) * 1000;
 }
 
-static void set(int fd, int level, int option, int value)
-{
-    /* A socket of another family, without the option, works too. */
-    (void)setsockopt(fd, level, option, &value, sizeof value);
-}
-
 static int prepare(int fd)
 {
     if (mbm_tcp_setFlags(fd) < 0)
         return -1;
-    set(fd, IPPROTO_TCP, TCP_NODELAY, 1);
-    set(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
+    set_number(fd, IPPROTO_TCP, TCP_NODELAY, 1);
+    set_number(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
 #ifdef TCP_KEEPIDLE
-    set(fd, IPPROTO_TCP, TCP_KEEPIDLE, IDLE_S);
-    set(fd, IPPROTO_TCP, TCP_KEEPINTVL, PROBE_INTERVAL_S);
-    set(fd, IPPROTO_TCP, TCP_KEEPCNT, PROBE_COUNT);
+    set_number(fd, IPPROTO_TCP, TCP_KEEPIDLE, IDLE_S);
+    set_number(fd, IPPROTO_TCP, TCP_KEEPINTVL, PROBE_INTERVAL_S);
+    set_number(fd, IPPROTO_TCP, TCP_KEEPCNT, PROBE_COUNT);
 #endif
 #ifdef TCP_USER_TIMEOUT
-    set(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS);
+    set_number(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS);
 #endif
     return 0;
 }
@@ -264,14 +307,13 @@ static int look_up(mbm_tcp *tcp)
 {
     mbm_tcp_addresses *all = tcp->addresses;
     struct addrinfo *found, *one;
+    int error;
 
-    if (mbm_tcp_lookUp(all->isLocal ? NULL : all->host, all->service, 0, &found,
-                       &tcp->lookupError) < 0) {
-        if (all->count == 0)
-            return -1;
-        tcp->lookupError = 0;
-        return 0;
+    if (mbm_tcp_lookUp(all->isLocal ? NULL : all->host, all->service, 0, &found, &error) < 0) {
+        tcp->lookupError = all->count == 0 ? (int16_t)error : 0;
+        return all->count == 0 ? -1 : 0;
     }
+    tcp->lookupError = 0;
     all->count = 0;
     for (one = found; one && all->count < MBM_TCP_ADDRESSES; one = one->ai_next) {
         if (one->ai_addrlen > sizeof all->list[0])
@@ -418,7 +460,6 @@ void mbm_tcp_disconnect(void *context)
     /* An address that does not answer must not keep the next attempt from those after it. */
     if (tcp->state == CONNECTING && tcp->addresses)
         tcp->addresses->first = tcp->addresses->next;
-    mbm_tcp_dropUnsent(tcp);
     leave_socket(tcp, LOST, tcp->state == CONNECTING ? ETIMEDOUT : ENOTCONN);
 }
 
@@ -431,9 +472,8 @@ COLD static int16_t none_moved(mbm_tcp *tcp, ssize_t count)
         return -1;
     if (error == EAGAIN || error == EWOULDBLOCK || error == EINTR)
         return 0;
-    /* lwIP may have queued the bytes of a write that failed, for lack of a route. */
-    mbm_tcp_noteWritten(tcp);
-    mbm_tcp_dropUnsent(tcp);
+    if (count < 0)
+        mbm_tcp_noteFailed(tcp);
     leave_socket(tcp, LOST, error);
     return -1;
 }
@@ -505,7 +545,7 @@ COLD static int16_t finish_write(mbm_tcp *tcp, ssize_t length, ssize_t count)
     if (count <= 0)
         return 0;
     note_activity(tcp);
-    mbm_tcp_noteWritten(tcp);
+    mbm_tcp_noteWritten(tcp, (uint16_t)count);
     return (int16_t)count;
 }
 
@@ -533,7 +573,7 @@ static int16_t tcp_write(void *context, const uint8_t *bytes, uint16_t length)
         return finish_write(tcp, all, count);
     report_again(tcp);
     note_activity(tcp);
-    mbm_tcp_noteWritten(tcp);
+    mbm_tcp_noteWritten(tcp, length);
     /* If the next read or write comes without a look at the clock, this time is too old for it. */
     tcp->clockUs = 0;
     return (int16_t)count;

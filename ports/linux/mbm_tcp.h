@@ -70,18 +70,19 @@ typedef struct mbm_tcp_addresses {
 
 /** A socket in use as a port. Initialise it with MBM_INIT. */
 typedef struct mbm_tcp {
-    int fd;          /**< the socket, while there is one */
-    int error;       /**< why there is no link, an errno: ETIMEDOUT while the connection is being
-                          made, and if it was given up meanwhile, since nothing has answered;
-                          EPIPE if the peer closed it, ETIMEDOUT if mbm_tcp_accept closed it as
-                          idle, ENOTCONN after mbm_tcp_disconnect; 0 while there is a link. It
-                          stays until the program connects anew */
-    int lookupError; /**< why no address was found, for gai_strerror; else 0 */
-    uint8_t isBusy;  /**< set by the program: 1 while the peer waits for a response, so that the
-                          connection is not idle; needed only for requests that may take longer
-                          than the idle time */
-    uint8_t state;   /**< private */
-    uint8_t events;  /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
+    int fd;    /**< the socket, while there is one */
+    int error; /**< why there is no link, an errno: ETIMEDOUT while the connection is being
+                    made, and if it was given up meanwhile, since nothing has answered;
+                    EPIPE if the peer closed it, ETIMEDOUT if mbm_tcp_accept closed it as
+                    idle, ENOTCONN after mbm_tcp_disconnect; 0 while there is a link. It
+                    stays until the program connects anew */
+    int16_t lookupError; /**< why no address was found, for gai_strerror; else 0 */
+    uint16_t lastWrite;  /**< private */
+    uint8_t isBusy;      /**< set by the program: 1 while the peer waits for a response, so that the
+                              connection is not idle; needed only for requests that may take longer
+                              than the idle time */
+    uint8_t state;       /**< private */
+    uint8_t events; /**< what to poll it for: POLLIN, and POLLOUT while it accepts no more bytes */
     uint8_t readiness;            /**< private */
     int64_t lastActivityUs;       /**< private */
     int64_t clockUs;              /**< private */
@@ -89,6 +90,9 @@ typedef struct mbm_tcp {
     struct mbm_tcp_set *set;      /**< private */
     struct mbm_tcp *next;         /**< private */
     void *owner;                  /**< private */
+#ifdef MBM_TCP_OVER_LWIP
+    uint32_t unanswered; /**< private */
+#endif
 } mbm_tcp;
 
 /** A socket that listens for connections. Initialise it with MBM_INIT. It takes two descriptors,
@@ -169,8 +173,16 @@ const char *mbm_tcp_text(const mbm_tcp *tcp);
  */
 int mbm_tcp_attach(mbm_tcp *tcp, int fd);
 
-/** Closes the socket, and frees the place for mbm_tcp_accept. Does nothing if the place is free
- *  already. */
+/**
+ * Closes the socket, and frees the place for mbm_tcp_accept. Does nothing if the place is free
+ * already.
+ *
+ * A socket of mbm_tcp_open or mbm_tcp_openLater is closed by a reset if the peer has not
+ * acknowledged a request: otherwise the system would still send it for up to 30 s, and a write that
+ * failed would be carried out later. Bytes that were written in the last 20 ms are still sent: the
+ * end of a TLS session, a request without a response. mbm_tcp_disconnect and mbm_tcp_connect end a
+ * connection in the same way.
+ */
 void mbm_tcp_close(mbm_tcp *tcp);
 
 /**

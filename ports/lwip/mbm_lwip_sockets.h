@@ -97,31 +97,29 @@ static inline int mbm_tcp_pollFor(struct pollfd *waits, nfds_t count, uint32_t t
         timeoutUs == MBM_TCP_FOREVER ? -1 : (int)(timeoutUs / 1000 + (timeoutUs % 1000 != 0)));
 }
 
-/* lwIP sends what was written before a close for minutes, and so perhaps a request that the program
- * has given up long ago. So a client's connection without an answer to the last bytes is reset.
- * This needs LWIP_SO_LINGER. */
-enum { MBM_TCP_UNANSWERED = 4 }; /* in mbm_tcp.readiness */
-
-static inline void mbm_tcp_noteWritten(mbm_tcp *tcp)
+/* lwIP does not say what the peer has acknowledged: at most all that was written since the last
+ * read.
+ */
+static inline uint32_t mbm_tcp_unacknowledged(const mbm_tcp *tcp)
 {
-    tcp->readiness |= MBM_TCP_UNANSWERED;
+    return tcp->unanswered;
+}
+
+static inline void mbm_tcp_noteWritten(mbm_tcp *tcp, uint16_t count)
+{
+    tcp->lastWrite = count;
+    tcp->unanswered += count;
 }
 
 static inline void mbm_tcp_noteRead(mbm_tcp *tcp)
 {
-    tcp->readiness &= (uint8_t)~MBM_TCP_UNANSWERED;
+    tcp->unanswered = 0;
 }
 
-static inline void mbm_tcp_dropUnsent(mbm_tcp *tcp)
+/* lwIP may have queued the bytes of a write that failed, for lack of a route. */
+static inline void mbm_tcp_noteFailed(mbm_tcp *tcp)
 {
-    struct linger now;
-
-    if (!(tcp->readiness & MBM_TCP_UNANSWERED) || tcp->addresses == NULL)
-        return;
-    tcp->readiness &= (uint8_t)~MBM_TCP_UNANSWERED;
-    now.l_onoff = 1;
-    now.l_linger = 0;
-    (void)lwip_setsockopt(tcp->fd, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+    tcp->unanswered = UINT32_MAX;
 }
 
 static inline void mbm_tcp_sleep(uint32_t micros)
