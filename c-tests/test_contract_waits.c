@@ -253,6 +253,57 @@ static void writes_at_9600(sim *s, uint16_t write_piece, uint16_t write_busy)
     OK(mbm_node_writeMultipleRegisters(&s->node, 0, 100));
 }
 
+/* Reads a register, and returns how many microseconds that took. The device answers at once. */
+static uint64_t time_of_a_read(sim *s)
+{
+    const uint64_t began = s->now;
+
+    sim_answer(s, 1, 500, "11 03 02 00 2A +");
+    OK(sim_read_one(s));
+    assert_int_equal(s->response[0], 42);
+    return s->now - began;
+}
+
+/* The device cannot have the request, so no late reply can come. */
+SIM_TEST(a_request_of_which_the_port_took_no_byte_delays_no_later_reply)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->write_never = 1;
+    IS(MBM_LINE_BUSY, sim_read_one(s));
+    s->write_never = 0;
+    assert_in_range(time_of_a_read(s), 0, 20000);
+}
+
+SIM_TEST(a_request_of_which_the_port_took_a_part_delays_no_later_reply)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    OK(mbm_node_setBlocking(n, 0));
+    s->write_piece = 3;
+    s->cut_allowed = 1;
+    IS(MBM_PENDING, sim_read_one(s));
+    while (s->counters.bytesSent == 0)
+        IS(MBM_PENDING, mbm_node_poll(n));
+    s->write_never = 1;
+    while (mbm_node_poll(n) == MBM_PENDING)
+        s->now += 1000;
+    IS(MBM_LINE_BUSY, mbm_node_status(n));
+    OK(mbm_node_setBlocking(n, 1));
+    s->write_never = 0;
+    s->write_piece = 0;
+    assert_in_range(time_of_a_read(s), 0, 20000);
+}
+
+/* The port took the whole request, and no hook says whether it left: the device may have it. So the
+ * next reply is held for a response timeout. */
+SIM_TEST(a_request_whose_flush_never_ended_may_be_answered_late)
+{
+    OK(mbm_node_setResponseTimeout(n, 100));
+    s->flush_never = 1;
+    IS(MBM_LINE_BUSY, sim_read_one(s));
+    s->flush_never = 0;
+    assert_in_range(time_of_a_read(s), 100000, 300000);
+}
+
 /* On a slow line the port still accepts bytes, so it is not stuck. */
 SIM_ROW(a_request_that_takes_longer_than_the_response_timeout_is_sent, writes_at_9600(s, 0, 0))
 /* One byte in 1 ms. */
