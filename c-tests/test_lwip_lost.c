@@ -122,6 +122,18 @@ TEST(no_memory_for_a_connection_is_a_lost_link_until_there_is_some)
     client_reads();
 }
 
+TEST(no_memory_for_a_request_is_a_busy_line_until_there_is_some)
+{
+    client_connect();
+    client_reads();
+    failing_writes = UINT32_MAX;
+    client_queue(REGISTERS);
+    IS(MBM_LINE_BUSY, ended(60000));
+    failing_writes = 0;
+    client_reads();
+    assert_int_equal(ends, 0);
+}
+
 TEST(a_reset_while_a_request_is_pending_ends_it)
 {
     client_connect();

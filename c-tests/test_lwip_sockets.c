@@ -43,6 +43,9 @@ static void begin(void)
     assert_int_equal(pthread_create(&task, NULL, read_task, &meter), 0);
 }
 
+static void fault_setup(void);
+static void fault_end(void);
+
 fixture all_tests = {begin, NULL}, each_test;
 
 /* --- the server */
@@ -277,4 +280,23 @@ TEST(a_connection_whose_request_was_answered_ends_without_a_reset)
     assert_int_equal(place.error, EPIPE);
     mbm_tcp_close(&place);
     mbm_tcp_closeListener(&listener);
+}
+
+/* --- the faults that Linux has too */
+
+/* lwIP has no route, and says so at once. */
+#define STATUS_WHILE_DOWN MBM_LINK_LOST
+
+#undef TEST
+#define TEST(name) TEST_WITH(name, fault_setup, fault_end)
+#include "tcp_faults.h"
+
+static void set_network(int is_up)
+{
+    relay_setNetwork(is_up);
+}
+
+static void fault_setup(void)
+{
+    fault_begin("1600");
 }

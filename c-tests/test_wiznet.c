@@ -437,6 +437,41 @@ TEST(a_client_in_a_network_that_is_down_times_out_and_reads_once_it_is_up)
     tcp_server_stop(&peer);
 }
 
+/* The chip takes no bytes while the last ones are not acknowledged. */
+TEST(a_client_whose_last_bytes_are_not_acknowledged_is_busy_and_reads_once_they_are)
+{
+    tcp_server peer;
+
+    tcp_server_start(&peer);
+    begin_client(peer.port);
+    IS(MBM_OK, read_by_client());
+    the_chip.busy_sends = CHIP_ALWAYS;
+    the_chip.is_unplugged = 1;
+    IS(MBM_LINE_BUSY, read_by_client());
+    assert_int_equal(the_chip.hard_closes, 0);
+    the_chip.busy_sends = 0;
+    the_chip.is_unplugged = 0;
+    is_right();
+    tcp_server_stop(&peer);
+}
+
+TEST(a_socket_that_was_never_connected_is_a_lost_link_until_it_is)
+{
+    const mbm_port port = mbm_wiznet_port(&device);
+    tcp_server peer;
+    uint8_t byte = 0;
+
+    assert_int_equal(port.read(&device, &byte, 1), -1);
+    assert_int_equal(port.write(&device, &byte, 1), -1);
+    IS(MBM_LINK_LOST, mbm_wiznet_status(&device));
+    mbm_wiznet_disconnect(&device);
+    assert_int_equal(the_chip.calls, 0);
+    tcp_server_start(&peer);
+    begin_client(peer.port);
+    is_right();
+    tcp_server_stop(&peer);
+}
+
 TEST(each_connection_of_a_client_has_another_local_port)
 {
     uint16_t first;

@@ -237,6 +237,16 @@ static void has_begun(void *context)
     sem_post(context);
 }
 
+void relay_setNetwork(int is_up)
+{
+    struct netif *netif;
+
+    LOCK_TCPIP_CORE();
+    NETIF_FOREACH(netif)
+    (is_up ? netif_set_up : netif_set_down)(netif);
+    UNLOCK_TCPIP_CORE();
+}
+
 void relay_begin(void)
 {
     static struct netif netif;

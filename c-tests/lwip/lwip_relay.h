@@ -14,6 +14,9 @@ extern ip_addr_t relay_loop;
 /* Begins lwIP, once in a program. */
 void relay_begin(void);
 
+/* Takes lwIP's interfaces down or up. lwIP has no route then. */
+void relay_setNetwork(int is_up);
+
 /* Takes connections of the machine to the port that it returns, and connects each to a TCP port in
  * lwIP. */
 uint16_t relay_toLwip(uint16_t lwip_port);

@@ -244,7 +244,8 @@ int32_t wiz_send(uint8_t number, uint8_t *bytes, uint16_t length)
     if (sockets[number].state != SOCK_ESTABLISHED && sockets[number].state != SOCK_CLOSE_WAIT)
         return SOCKERR_SOCKSTATUS;
     if (the_chip.busy_sends > 0) {
-        the_chip.busy_sends--;
+        if (the_chip.busy_sends != CHIP_ALWAYS)
+            the_chip.busy_sends--;
         return SOCK_BUSY;
     }
     must(length <= wiz_free(number), "send would wait");

@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-enum { CHIP_SOCKETS = 8, CHIP_BUFFER = 2048 };
+enum { CHIP_SOCKETS = 8, CHIP_BUFFER = 2048, CHIP_ALWAYS = 0xFF };
 
 typedef struct chip_model {
     uint8_t
@@ -16,7 +16,8 @@ typedef struct chip_model {
     uint8_t is_deaf;        /* no peer acknowledges the end of the stream */
     uint16_t most_sent;     /* free bytes of the transmit buffer; 0: 2048 */
     uint16_t most_received; /* bytes that show at once in the receive buffer; 0: all */
-    uint8_t busy_sends; /* the next sends return SOCK_BUSY: the last bytes are not acknowledged */
+    uint8_t busy_sends; /* the next sends return SOCK_BUSY, or CHIP_ALWAYS: the last bytes are not
+                           acknowledged */
     unsigned calls,
         fail_at; /* commands; the one that finds the connection reset, from 1 on; 0: none */
     uint16_t local_port[CHIP_SOCKETS];
