@@ -38,6 +38,6 @@ unsigned own_network_sockets(uint16_t port)
     must(table != NULL, "the table of sockets");
     while (fgets(line, sizeof line, table))
         found += sscanf(line, "%*u: %*x:%x", &own) == 1 && own == port;
-    fclose(table);
+    (void)fclose(table);
     return found;
 }
