@@ -158,6 +158,7 @@ check: need-check $(ARCHIVE) ## Check formatting, lints, layers, circles, header
 	@CARGO="$(CARGO)" scripts/check/names
 	@scripts/check/packages
 	@scripts/check/kits
+	@scripts/check/port-faults
 	@scripts/build/project.py --check
 	@CARGO="$(CARGO)" scripts/check/dependencies
 	@$(MAKE) --no-print-directory spell
