@@ -4,7 +4,7 @@
 
 use core::task::Poll;
 use mbm::engine::Buffers;
-use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::crc16;
 use mbm::master::Master;
 use mbm::port::Port;
 

@@ -13,7 +13,7 @@ mod random;
 use mbm::client::{Client, Request, Serial, Settings};
 use mbm::engine::{Buffers, Frame, MicrosSetting};
 use mbm::error::Status;
-use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::crc16;
 use mbm::master::Master;
 use mbm::master::{node::Node, request::Line};
 use mbm::pdu::functions::FunctionSpec;

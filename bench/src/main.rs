@@ -93,7 +93,7 @@ fn instructions() {
 fn crc(length: usize) -> Work {
     let bytes: Vec<u8> = (0..length).map(|index| (index * 7 + 3) as u8).collect();
     Box::new(move || {
-        black_box(mbm::frame::checksum::crc16(black_box(&bytes)));
+        black_box(mbm::frame::rtu::crc16(black_box(&bytes)));
     })
 }
 

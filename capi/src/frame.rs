@@ -8,7 +8,8 @@ use super::packet::{
 };
 use super::pointers::{In, Out};
 use mbm::error::{Error, Status};
-use mbm::frame::checksum::{crc16, lrc, Crc16};
+use mbm::frame::ascii::lrc;
+use mbm::frame::rtu::{crc16, Crc16};
 use mbm::frame::{Adu, Framing};
 use mbm::packet::refusal::{Exception, Head};
 use mbm::packet::{length, PduKind};

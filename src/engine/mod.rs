@@ -16,20 +16,19 @@
 pub mod ascii;
 mod extras;
 mod late;
-mod late_units;
 mod poll;
 mod search;
 mod settings;
 mod storage;
 mod transaction;
 
-pub use late_units::LateUnits;
+pub use late::LateUnits;
 pub use settings::{MicrosSetting, Settings};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 pub use transaction::Transaction;
 
 use crate::error::Status;
-use crate::frame::checksum::Crc16;
+use crate::frame::rtu::Crc16;
 use crate::time::Micros;
 
 /// The unit address of a broadcast (serial line guide V1.02, 2.2).

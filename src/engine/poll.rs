@@ -5,8 +5,8 @@ use super::{
     Count, Engine, Finding, LateUnits, Moment, Phase, Settings, Storage, Transaction, BROADCAST,
 };
 use crate::error::Status;
-use crate::frame::checksum::{crc16, Crc16};
 use crate::frame::rtu;
+use crate::frame::rtu::{crc16, Crc16};
 use crate::port::Port;
 use crate::time::{add_characters, elapsed, has_elapsed, sure_to_be_sending};
 

@@ -12,7 +12,7 @@
 
 use super::{Count, Engine, Finding, Moment, Phase, Storage, Transaction};
 use crate::error::Status;
-use crate::frame::checksum::Crc16;
+use crate::frame::rtu::Crc16;
 use crate::frame::rtu::{self, MIN_FRAME};
 use crate::pdu::EXCEPTION;
 use crate::port::Port;

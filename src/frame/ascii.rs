@@ -1,7 +1,6 @@
 //! ASCII frames: a colon, two hexadecimal characters for each byte of unit, PDU and LRC, a
 //! carriage return, and an end character (serial line guide V1.02, 2.5.2).
 
-use super::checksum::lrc;
 use super::rtu::Adu;
 use crate::error::Error;
 
@@ -251,6 +250,16 @@ pub fn encode(buffer: &mut [u8], content: usize, end: u8) -> Result<usize, Error
         *last = end;
     }
     Ok(total)
+}
+
+/// The LRC of `bytes`: the sum of `bytes` and the LRC is 0 modulo 256.
+///
+/// ```
+/// assert_eq!(mbm::frame::ascii::lrc(&[17, 6, 0x00, 0x6D, 0x03, 0x78]), 0x01);
+/// ```
+pub fn lrc(bytes: &[u8]) -> u8 {
+    let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    sum.wrapping_neg()
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Frames (application data units): how each framing carries a unit id and a PDU.
 
 pub mod ascii;
-pub mod checksum;
 pub mod rtu;
 pub mod tcp;
 

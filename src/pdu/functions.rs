@@ -7,6 +7,7 @@
 
 use super::custom::is_user_defined;
 use super::custom::Rule::{self, Counted, Fixed};
+use crate::error::Status;
 
 /// What a function does to the data of a device.
 ///
@@ -494,4 +495,21 @@ impl FunctionSpec {
     );
     /// A user-defined function; its code and its length rule are added later.
     pub const CUSTOM: FunctionSpec = FunctionSpec::new(0, 0, 1, 0, 0, 1);
+}
+
+/// A number of items. More than 65535 are refused as 65535 are.
+pub(crate) fn quantity(items: usize) -> u16 {
+    items.try_into().unwrap_or(u16::MAX)
+}
+
+/// Checks a range of addresses as every device would (application protocol,
+/// figures 11 and following: quantity first, then addresses).
+pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
+    if quantity == 0 || quantity > most {
+        Status::ILLEGAL_DATA_VALUE
+    } else if address.checked_add(quantity - 1).is_none() {
+        Status::ILLEGAL_DATA_ADDRESS
+    } else {
+        Status::OK
+    }
 }

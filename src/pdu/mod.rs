@@ -18,8 +18,7 @@ pub mod request;
 pub mod response;
 
 pub use functions::is_public;
-
-use crate::error::Status;
+pub(crate) use functions::{check_range, quantity};
 
 /// The bit that is set in the function code of an exception response (clause 7).
 pub const EXCEPTION: u8 = 0x80;
@@ -55,20 +54,3 @@ pub const WRITE_FILE_BYTES: (usize, usize) = (0x09, 0xFB);
 /// The value of the field "more follows" in a response to 2B/0E if more objects follow; else it is 0
 /// (6.21).
 const MORE: u8 = 0xFF;
-
-/// A number of items. More than 65535 are refused as 65535 are.
-pub(crate) fn quantity(items: usize) -> u16 {
-    items.try_into().unwrap_or(u16::MAX)
-}
-
-/// Checks a range of addresses as every device would (application protocol,
-/// figures 11 and following: quantity first, then addresses).
-pub(crate) fn check_range(address: u16, quantity: u16, most: u16) -> Status {
-    if quantity == 0 || quantity > most {
-        Status::ILLEGAL_DATA_VALUE
-    } else if address.checked_add(quantity - 1).is_none() {
-        Status::ILLEGAL_DATA_ADDRESS
-    } else {
-        Status::OK
-    }
-}

@@ -5,7 +5,7 @@ use super::line::{LatencyOrReadAhead, Receive, Server, ServerStorage, READ_AHEAD
 use super::{Indication, Reply, Units};
 use crate::error::{Error, Status};
 use crate::frame::ascii::{CharacterKind, Decoded};
-use crate::frame::checksum::Crc16;
+use crate::frame::rtu::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Function;
 use crate::pdu::functions::{DIAGNOSTICS, ENCAPSULATED_INTERFACE_TRANSPORT};

@@ -7,7 +7,7 @@
 use super::{Indication, Reply, Units};
 use crate::engine::Storage;
 use crate::error::{Error, Status};
-use crate::frame::checksum::Crc16;
+use crate::frame::rtu::Crc16;
 use crate::frame::{ascii, rtu, tcp, Framing};
 use crate::pdu::custom::Rule;
 use crate::pdu::MAX_PDU;

@@ -1,7 +1,7 @@
 //! A device with everything that a server can serve, for tests to send requests to.
 
 use super::frame::sealed;
-use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::crc16;
 use mbm::frame::Framing;
 use mbm::pdu::files::Record;
 use mbm::server::custom::{Custom, DisabledFunctions, HandlerResult};

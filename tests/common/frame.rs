@@ -3,7 +3,7 @@
 // Each user takes only a part of this module.
 #![allow(dead_code)]
 
-use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::crc16;
 use mbm::frame::{ascii, Framing};
 
 /// The frame of a PDU. Only Modbus TCP has the transaction.

@@ -2,7 +2,7 @@
 
 use crate::bench::{frame, rtu, Bench};
 use crate::exchanges::EXCHANGES;
-use mbm::frame::checksum::crc16;
+use mbm::frame::rtu::crc16;
 use mbm::frame::Framing;
 use mbm::sniffer::{BusDirection, EventKind};
 use proptest::prelude::*;
