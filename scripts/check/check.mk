@@ -65,14 +65,14 @@ BOARDS ?=
 .PHONY: check-real
 check-real: $(ARCHIVE) ## Build and run package and example in a real kit's tree: KIT=zephyr, rt-thread, esp-idf, freertos, lwip, freertos-lwip, wiznet, stm32, pico or another library, FOLDER=its folder
 	@scripts/need python3 python3-venv cmake ninja-build device-tree-compiler gperf gcc libc6-dev libcmocka-dev libmodbus-dev gcc-arm-none-eabi libnewlib-arm-none-eabi g++ gcc-avr avr-libc arduino-core-avr \
-		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm
+		gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf libstdc++-arm-none-eabi-newlib qemu-system-arm
 	@$(MAKE) --no-print-directory BOARDS= assembler $(BUILD)/plain/mbm
 	@scripts/check/real $(KIT) $(FOLDER) $(BOARDS)
 
 # The folders of `make check-real` for these kits, and a clone of nanoMODBUS.
 .PHONY: bench-kits
 bench-kits: $(ARCHIVE) ## Measure the examples for FREERTOS, STM32 and PICO, the folders of the kits, beside NANOMODBUS, its clone; writes docs/reports/kits.md
-	@scripts/need python3 cmake ninja-build gcc libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+	@scripts/need python3 cmake ninja-build gcc libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
 	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
 	@scripts/bench/kits $(FREERTOS) $(STM32) $(PICO) $(NANOMODBUS)
 
