@@ -1,17 +1,11 @@
 /* The port for FreeRTOS in the test kit for ports. Tasks are threads: see test_freertos.c. */
-#include "mbm_porttest.h"
+#include "porttest.h"
 #include "await.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "uart.h"
 
 static pty far_end;
-
-static void hear(void *context, mbm_portFinding kind, const char *sentence)
-{
-    if (kind == MBM_PORT_WRONG)
-        print_error("%s\n", sentence);
-}
 
 static uint32_t lost(void *context)
 {
@@ -65,7 +59,7 @@ TEST(the_port_passes_the_test_kit)
     test = (mbm_portTest){.port = &port,
                           .other = &other,
                           .holds = MBM_MAX_FRAME,
-                          .say = hear,
+                          .say = porttest_say,
                           .lost = lost,
                           .driver = driver,
                           .begin = begin,

@@ -76,6 +76,12 @@ bench-kits: $(ARCHIVE) ## Measure the examples for FREERTOS, STM32 and PICO, the
 	@$(MAKE) --no-print-directory $(BUILD)/plain/mbm
 	@scripts/bench/kits $(FREERTOS) $(STM32) $(PICO) $(NANOMODBUS)
 
+PORT_REPORTS := $(filter-out test_porttest,$(PORT_TESTS))
+.PHONY: port-reports
+port-reports: ## Give the ports that run on this machine to the test kit for ports; writes a table of docs/reports/kits.md
+	@$(MAKE) --no-print-directory test-c TESTS="$(PORT_REPORTS)" BUILDS=plain
+	@scripts/bench/port-reports $(PORT_REPORTS:%=$(BUILD)/plain/%)
+
 .PHONY: misra
 misra: ## Run cppcheck, for C with its addon for MISRA C; docs/maintainers/misra.md lists the accepted findings
 	@scripts/need cppcheck
