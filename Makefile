@@ -43,6 +43,8 @@ BARE_UARTS := $(filter-out simcall,$(patsubst ports/baremetal/uart/%.c,%,$(wildc
 ZEPHYR_TESTS := $(filter test_zephyr%,$(TESTS))
 ZEPHYR_STAND_IN := packaging/zephyr/stand-in
 WIZNET_TESTS := $(filter test_wiznet test_porttest_wiznet,$(TESTS))
+RT_THREAD_TESTS := $(filter test_rt_thread%,$(TESTS))
+ESP_IDF_TESTS := $(filter test_esp_idf%,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
 TESTED_EXAMPLES := custom_server guarded_server
@@ -337,6 +339,13 @@ $(BUILD)/$(1)/test_baremetal: $(patsubst %,$(BUILD)/$(1)/baremetal/%.o,$(BARE_UA
 $(BUILD)/$(1)/test_baremetal: INCLUDES := -Ic-tests/baremetal -Iports/baremetal $(INCLUDES)
 $(WIZNET_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/wiznet/%.o,chip_model mbm_wiznet)
 $(WIZNET_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/wiznet -Iports/wiznet
+$(ESP_IDF_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/esp-idf/%.o,uart_model mbm_esp_idf)
+$(ESP_IDF_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/esp-idf -Iports/esp-idf \
+    $(patsubst %,-Ipackaging/esp-idf/stand-in/%/include,common esp_driver_uart esp_driver_gpio esp_timer)
+$(BUILD)/$(1)/test_rt_thread: $(patsubst %,$(BUILD)/$(1)/rt-thread/%.o,serial_model mbm_rt_thread)
+$(BUILD)/$(1)/test_rt_thread_v2: $(BUILD)/$(1)/rt-thread/serial_v2.o
+$(BUILD)/$(1)/test_rt_thread_v2_untimed: $(BUILD)/$(1)/rt-thread/serial_v2_untimed.o
+$(RT_THREAD_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/rt-thread -Iports/rt-thread -Ipackaging/rt-thread/stand-in/include
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/lwip/%.o,mbm_lwip mbm_lwip_listener)
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -D_GNU_SOURCE= -Ic-tests/lwip -Iports/lwip -isystem /usr/include/lwip
 $(LWIP_TESTS:%=$(BUILD)/$(1)/%): LIBS += -llwip

@@ -29,7 +29,7 @@ TREES = {
     "freertos-lwip": (Tree("FreeRTOS-Kernel", "FreeRTOS/FreeRTOS-Kernel", "4269c69a16f924c11adeedbb31591f6fad9f41b2", "11.1.0+"),
                       Tree("lwip", "lwip-tcpip/lwip", "3d896ba0a37ff3ce73270ca5e230707fe47f60e3", "2.2.2, in development")),
     "wiznet": (Tree("", "Wiznet/ioLibrary_Driver", "1d2582a7d0d9ff237e37173bb32aecf487a0faf0", "2025-09-10"),),
-    "esp-idf": (Tree("", "espressif/esp-idf", "7101770d", "6.0.2"),),
+    "esp-idf": (Tree("", "espressif/esp-idf", "102122904ade11fd1ae373848f34ffd7dfb18aeb", "6.2.0, in development"),),
     "zephyr": (Tree("zephyr", "wdrx70xn/zvm", "b3ccfc41", "3.7.1, a fork"),
                Tree("modules/hal/cmsis", "zephyrproject-rtos/cmsis", "4b96cbb1", ""),
                Tree("modules/hal/nordic", "zephyrproject-rtos/hal_nordic", "ab5cb2e2", "")),

@@ -11,14 +11,16 @@
 
 extern int (*const stand_in_command)(int, char **);
 
-struct rt_device {
-    bool is_open, is_configured;
-};
-
 static struct rt_device uart;
-static bool is_output;
+static bool is_configured, is_output;
+static rt_err_t (*indicate)(rt_device_t device, rt_size_t size);
 
-void line_interrupt(void) {}
+/* Bytes have arrived, perhaps. */
+void line_interrupt(void)
+{
+    if (uart.ref_count > 0 && indicate != NULL && line_received() > 0)
+        (void)indicate(&uart, line_received());
+}
 
 rt_device_t rt_device_find(const char *name)
 {
@@ -29,7 +31,14 @@ rt_err_t rt_device_control(rt_device_t device, int command, void *argument)
 {
     const struct serial_configure *config = argument;
 
-    line_expect(device == &uart && command == RT_DEVICE_CTRL_CONFIG && !uart.is_open,
+#ifdef RT_SERIAL_CTRL_SET_TX_TIMEOUT
+    if (command == RT_SERIAL_CTRL_SET_TX_TIMEOUT) {
+        line_expect(device == &uart && uart.ref_count == 1 && *(rt_int32_t *)argument > 0,
+                    "the timeout");
+        return RT_EOK;
+    }
+#endif
+    line_expect(device == &uart && command == RT_DEVICE_CTRL_CONFIG && uart.ref_count == 0,
                 "the control");
     line_expect(config->data_bits == DATA_BITS_8 && config->parity == PARITY_EVEN &&
                     config->stop_bits == STOP_BITS_1,
@@ -40,13 +49,13 @@ rt_err_t rt_device_control(rt_device_t device, int command, void *argument)
     line_expect(config->bufsz >= 256, "the buffer is too small");
 #endif
     line_begin(config->baud_rate);
-    uart.is_configured = true;
+    is_configured = true;
     return RT_EOK;
 }
 
 rt_err_t rt_device_open(rt_device_t device, rt_uint16_t flags)
 {
-    line_expect(device == &uart && uart.is_configured && !uart.is_open, "the device is opened");
+    line_expect(device == &uart && is_configured && uart.ref_count == 0, "the device is opened");
 #ifdef RT_USING_SERIAL_V2
     line_expect(flags == (RT_DEVICE_FLAG_RX_NON_BLOCKING | RT_DEVICE_FLAG_TX_BLOCKING),
                 "the flags");
@@ -55,26 +64,35 @@ rt_err_t rt_device_open(rt_device_t device, rt_uint16_t flags)
     line_expect(flags == (RT_DEVICE_OFLAG_RDWR | RT_DEVICE_FLAG_INT_RX), "the flags");
     printf("serial framework: 1\n");
 #endif
-    uart.is_open = true;
+    uart.ref_count = 1;
     return RT_EOK;
 }
 
 rt_err_t rt_device_close(rt_device_t device)
 {
-    line_expect(device == &uart && uart.is_open, "another device is closed");
-    uart.is_open = false;
+    line_expect(device == &uart && uart.ref_count == 1, "another device is closed");
+    uart.ref_count = 0;
+    indicate = NULL;
+    return RT_EOK;
+}
+
+rt_err_t rt_device_set_rx_indicate(rt_device_t device,
+                                   rt_err_t (*function)(rt_device_t device, rt_size_t size))
+{
+    line_expect(device == &uart && uart.ref_count == 1, "another device indicates");
+    indicate = function;
     return RT_EOK;
 }
 
 rt_ssize_t rt_device_read(rt_device_t device, rt_off_t position, void *bytes, rt_size_t size)
 {
-    line_expect(device == &uart && uart.is_open && position == 0, "no device to read from");
+    line_expect(device == &uart && uart.ref_count == 1 && position == 0, "no device to read from");
     return line_read(bytes, (uint16_t)size);
 }
 
 rt_ssize_t rt_device_write(rt_device_t device, rt_off_t position, const void *bytes, rt_size_t size)
 {
-    line_expect(device == &uart && uart.is_open && position == 0, "no device to write to");
+    line_expect(device == &uart && uart.ref_count == 1 && position == 0, "no device to write to");
     size = line_write(bytes, (uint16_t)size);
     while (line_unsent() > MBM_EXAMPLE_TAIL)
         line_sleep(1);
@@ -92,6 +110,11 @@ void rt_pin_write(rt_base_t pin, rt_ssize_t value)
 {
     line_expect(pin == MBM_EXAMPLE_DRIVER_PIN && is_output, "another pin is set");
     line_drive(value == PIN_HIGH);
+}
+
+rt_ssize_t rt_pin_read(rt_base_t pin)
+{
+    return pin == MBM_EXAMPLE_DRIVER_PIN ? PIN_LOW : -RT_EINVAL;
 }
 
 rt_tick_t rt_tick_get(void)
@@ -127,6 +150,6 @@ int main(void)
         return 0;
     }
     line_expect(stand_in_command(0, NULL) == 0, "the command fails");
-    line_expect(!uart.is_open, "the device is left open");
+    line_expect(uart.ref_count == 0, "the device is left open");
     return 0;
 }

@@ -16,6 +16,11 @@ struct serial_configure {
     rt_uint32_t data_bits : 4, stop_bits : 2, parity : 2, bit_order : 1, invert : 1;
     rt_uint32_t rx_bufsz : 16, tx_bufsz : 16;
 };
+
+/* The first releases with version 2 do not have it. */
+#ifndef STAND_IN_WITHOUT_TX_TIMEOUT
+#define RT_SERIAL_CTRL_SET_TX_TIMEOUT 0x42
+#endif
 #else
 struct serial_configure {
     rt_uint32_t baud_rate;
@@ -35,3 +40,4 @@ struct serial_configure {
 
 void rt_pin_mode(rt_base_t pin, rt_uint8_t mode);
 void rt_pin_write(rt_base_t pin, rt_ssize_t value);
+rt_ssize_t rt_pin_read(rt_base_t pin);

@@ -4,6 +4,8 @@
 #include <stdint.h>
 
 typedef uint32_t TickType_t;
+typedef int BaseType_t;
+typedef unsigned UBaseType_t;
 typedef struct QueueDefinition *QueueHandle_t;
 
 #define configTICK_RATE_HZ 100

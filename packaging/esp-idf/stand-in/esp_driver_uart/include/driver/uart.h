@@ -3,6 +3,8 @@
 
 #include "esp_err.h"
 #include "freertos/FreeRTOS.h"
+#include "freertos/queue.h"
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,11 +26,28 @@ typedef struct {
     uart_sclk_t source_clk;
 } uart_config_t;
 
+typedef enum {
+    UART_DATA,
+    UART_BREAK,
+    UART_BUFFER_FULL,
+    UART_FIFO_OVF,
+    UART_FRAME_ERR,
+    UART_PARITY_ERR
+} uart_event_type_t;
+
+typedef struct {
+    uart_event_type_t type;
+    size_t size;
+    bool timeout_flag;
+} uart_event_t;
+
 #define UART_PIN_NO_CHANGE (-1)
 
 esp_err_t uart_driver_install(uart_port_t uart, int rx_size, int tx_size, int queue_size,
                               QueueHandle_t *queue, int flags);
 esp_err_t uart_driver_delete(uart_port_t uart);
+bool uart_is_driver_installed(uart_port_t uart);
+esp_err_t uart_enable_intr_mask(uart_port_t uart, uint32_t mask);
 esp_err_t uart_param_config(uart_port_t uart, const uart_config_t *config);
 esp_err_t uart_set_pin(uart_port_t uart, int tx, int rx, int rts, int cts);
 esp_err_t uart_set_mode(uart_port_t uart, uart_mode_t mode);

@@ -1,0 +1,1 @@
+#define RT_TICK_PER_SECOND 1000
