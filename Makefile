@@ -342,6 +342,7 @@ $(WIZNET_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/wiznet -Iports/wiznet
 $(ESP_IDF_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/esp-idf/%.o,uart_model mbm_esp_idf)
 $(ESP_IDF_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/esp-idf -Iports/esp-idf \
     $(patsubst %,-Ipackaging/esp-idf/stand-in/%/include,common esp_driver_uart esp_driver_gpio esp_timer)
+$(RT_THREAD_TESTS:%=$(BUILD)/$(1)/%): $(BUILD)/$(1)/rt-thread/chip.o
 $(BUILD)/$(1)/test_rt_thread: $(patsubst %,$(BUILD)/$(1)/rt-thread/%.o,serial_model mbm_rt_thread)
 $(BUILD)/$(1)/test_rt_thread_v2: $(BUILD)/$(1)/rt-thread/serial_v2.o
 $(BUILD)/$(1)/test_rt_thread_v2_untimed: $(BUILD)/$(1)/rt-thread/serial_v2_untimed.o

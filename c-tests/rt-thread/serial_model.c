@@ -1,14 +1,10 @@
 #include "serial_model.h"
 
-#include "mbm.h"
 #include "test.h"
 
-#include <rthw.h>
-
-enum { BUFFER = 4096, CHARACTER_BITS = 11 };
+enum { BUFFER = 4096 };
 
 struct rt_device rtt_uart;
-rtt_chip chip;
 
 /* "uart3", at which nothing happens. */
 static struct rt_device other;
@@ -19,41 +15,6 @@ static rt_err_t (*indicate)(rt_device_t device, rt_size_t size);
 static uint8_t received[BUFFER];
 static unsigned put, get, size;
 static bool isFull;
-static uint64_t replyAt;
-static int output;
-
-void rtt_chip_reset(void)
-{
-    memset(&chip, 0, sizeof chip);
-    memset(&rtt_uart, 0, sizeof rtt_uart);
-    memset(&config, 0, sizeof config);
-    chip.baud = 19200;
-    chip.knowsPins = true;
-    indicate = NULL;
-    put = get = 0;
-    isFull = false;
-    replyAt = 0;
-    output = -1;
-}
-
-static uint64_t character(void)
-{
-    return CHARACTER_BITS * 1000000u / chip.baud;
-}
-
-static bool is_stopped(void)
-{
-    return chip.stopsAfter > 0 && chip.sent >= chip.stopsAfter;
-}
-
-static void send(uint8_t byte)
-{
-    chip.undriven += !chip.isDriving;
-    assert_true(chip.sent < sizeof chip.line);
-    chip.line[chip.sent++] = byte;
-    if (chip.reply != NULL)
-        replyAt = chip.now + 4 * character();
-}
 
 /* --- transmission */
 
@@ -65,15 +26,15 @@ static bool isActivated;
 static rt_int32_t timeout;
 static uint64_t nextAt;
 
-static void work(void)
+void rtt_framework_work(void)
 {
-    if (is_stopped())
-        nextAt = chip.now + character();
+    if (rtt_is_stopped())
+        nextAt = chip.now + rtt_character();
     if (leavingCount == 0 || chip.now < nextAt)
         return;
-    send(leaving[0]);
+    rtt_send(leaving[0]);
     memmove(leaving, leaving + 1, --leavingCount);
-    nextAt = chip.now + character();
+    nextAt = chip.now + rtt_character();
     isActivated = leavingCount > 0;
 }
 
@@ -89,10 +50,10 @@ static unsigned transmit(const uint8_t *bytes, unsigned length)
 
         memcpy(leaving, bytes + done, part);
         leavingCount = part;
-        nextAt = chip.now + character();
+        nextAt = chip.now + rtt_character();
         isActivated = true;
         while (isActivated) {
-            if (timeout == RT_WAITING_FOREVER && is_stopped())
+            if (timeout == RT_WAITING_FOREVER && rtt_is_stopped())
                 fail_msg("rt_device_write waits for ever");
             rtt_chip_pass(100);
             if (timeout != RT_WAITING_FOREVER && chip.now - begun >= (unsigned)timeout * 1000ull)
@@ -110,7 +71,7 @@ static void begin_sending(void)
     isActivated = false;
 }
 #else
-static void work(void) {}
+void rtt_framework_work(void) {}
 
 static void begin_sending(void) {}
 
@@ -120,18 +81,11 @@ static unsigned transmit(const uint8_t *bytes, unsigned length)
     unsigned done;
 
 #ifdef RT_USING_SERIAL_V2
-    if (config.tx_bufsz != 0 && is_stopped())
+    if (config.tx_bufsz != 0 && rtt_is_stopped())
         fail_msg("rt_device_write waits for ever");
 #endif
-    for (done = 0; done < length && !is_stopped(); done++) {
-        rtt_chip_pass(character());
-        send(bytes[done]);
-        /* The character leaves, and the driver says that it did not. */
-        if (chip.characterTimeout > 0 && chip.characterTimeout < character())
-            break;
-    }
-    if (is_stopped())
-        rtt_chip_pass(10000);
+    for (done = 0; done < length && rtt_send_waiting(bytes[done]); done++)
+        ;
     return done;
 }
 #endif
@@ -162,32 +116,26 @@ static void interrupt(void)
         (void)indicate(&rtt_uart, waiting);
 }
 
-void rtt_chip_receive(const uint8_t *bytes, unsigned length)
+void rtt_framework_receive(uint8_t byte)
 {
-    for (unsigned i = 0; i < length; i++) {
-        chip.now += character();
-        if (rtt_uart.ref_count == 0)
-            continue;
-        keep(bytes[i]);
-        interrupt();
-    }
-}
-
-void rtt_chip_pass(uint64_t micros)
-{
-    const uint64_t end = chip.now + micros, step = character() / 16 + 1;
-
-    while (chip.now < end) {
-        chip.now = end - chip.now < step ? end : chip.now + step;
-        work();
-        if (replyAt != 0 && chip.now >= replyAt) {
-            replyAt = 0;
-            rtt_chip_receive(chip.reply, chip.replyLength);
-        }
-    }
+    if (rtt_uart.ref_count == 0)
+        return;
+    keep(byte);
+    interrupt();
 }
 
 /* --- the device */
+
+void rtt_framework_reset(void)
+{
+    memset(&rtt_uart, 0, sizeof rtt_uart);
+    memset(&other, 0, sizeof other);
+    memset(&config, 0, sizeof config);
+    indicate = NULL;
+    put = get = 0;
+    isFull = false;
+    begin_sending();
+}
 
 rt_device_t rt_device_find(const char *name)
 {
@@ -263,11 +211,6 @@ rt_err_t rt_device_close(rt_device_t device)
     return RT_EOK;
 }
 
-void rtt_chip_close(void)
-{
-    (void)rt_device_close(&rtt_uart);
-}
-
 rt_err_t rt_device_set_rx_indicate(rt_device_t device,
                                    rt_err_t (*function)(rt_device_t device, rt_size_t size))
 {
@@ -295,58 +238,25 @@ rt_ssize_t rt_device_read(rt_device_t device, rt_off_t position, void *bytes, rt
 rt_ssize_t rt_device_write(rt_device_t device, rt_off_t position, const void *bytes,
                            rt_size_t length)
 {
-    const uint64_t begun = chip.now;
-    unsigned count = 0;
-
     assert_ptr_equal(device, &rtt_uart);
     assert_int_equal(position, 0);
-    if (rtt_uart.ref_count > 0)
-        count = transmit(bytes, (unsigned)length);
-    if (chip.now - begun > chip.mostWaitedMicros)
-        chip.mostWaitedMicros = (unsigned)(chip.now - begun);
-    return count;
+    return rtt_uart.ref_count > 0 ? transmit(bytes, (unsigned)length) : 0;
 }
 
-/* --- pins, clock and threads */
-
-static bool is_pin(rt_base_t pin)
-{
-    return pin >= 0 && pin < RTT_PINS;
-}
+/* --- pins */
 
 void rt_pin_mode(rt_base_t pin, rt_uint8_t mode)
 {
     assert_int_equal(mode, PIN_MODE_OUTPUT);
-    if (is_pin(pin))
-        output = (int)pin;
+    rtt_pin_mode(pin);
 }
 
 void rt_pin_write(rt_base_t pin, rt_ssize_t value)
 {
-    if (pin == output && pin == RTT_DRIVER_PIN)
-        chip.isDriving = value == PIN_HIGH;
+    rtt_pin_write(pin, value == PIN_HIGH);
 }
 
 rt_ssize_t rt_pin_read(rt_base_t pin)
 {
-    if (chip.knowsPins && !is_pin(pin))
-        return -RT_EINVAL;
-    return pin == RTT_DRIVER_PIN && chip.isDriving ? PIN_HIGH : PIN_LOW;
-}
-
-rt_tick_t rt_tick_get(void)
-{
-    rtt_chip_pass(1);
-    return (rt_tick_t)(chip.now / (1000000 / RT_TICK_PER_SECOND));
-}
-
-rt_err_t rt_thread_delay(rt_tick_t ticks)
-{
-    rtt_chip_pass(ticks * (1000000 / RT_TICK_PER_SECOND));
-    return RT_EOK;
-}
-
-void rt_hw_us_delay(rt_uint32_t micros)
-{
-    rtt_chip_pass(micros);
+    return rtt_pin_read(pin);
 }

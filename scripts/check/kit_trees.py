@@ -62,7 +62,9 @@ ROWS = {
                Row("qemu_cortex_m0", "Cortex-M0", "yes", "yes", "QEMU's microbit, against `mbm serve`"),
                Row("native_sim", "x86-64", "yes", "yes", "on this machine, against `mbm serve`"),
                Row("nrf52840dk", "Cortex-M4", "yes", "yes", None)),
-    "rt-thread": (Row("lm3s8962", "Cortex-M3", "yes", "yes", "QEMU's lm3s6965evb, against `mbm serve`"),),
+    "rt-thread": (Row("lm3s8962", "Cortex-M3", "yes", "yes", "QEMU's lm3s6965evb, against `mbm serve`"),
+                  *(Row(f"host-v{version}", "x86-64", "yes", f"with version {version} of the serial framework and the pin device",
+                        "on this machine, over a UART that is played, with each fault") for version in (1, 2))),
 }
 
 
