@@ -119,7 +119,7 @@ TEST(a_request_is_answered_with_each_kind_of_driver)
     for (size_t i = 0; i < COUNT(drivers); i++) {
         begin_master(drivers[i]);
         works(0);
-        assert_int_equal(uart.overruns + uart.damaged + uart.stalled, 0);
+        assert_int_equal(uart.overruns + uart.faulty + uart.stalled, 0);
     }
 }
 
@@ -395,16 +395,16 @@ TEST(a_damaged_character_is_counted_and_the_reply_after_it_is_right)
     begin_master(MBM_ESP_IDF_DRIVER_BY_UART);
     esp_chip_receive_faulty(0, UART_PARITY_ERR);
     works(0);
-    assert_int_equal(uart.damaged, 1);
+    assert_int_equal(uart.faulty, 1);
     esp_chip_receive_faulty(0xFF, UART_FRAME_ERR);
     works(sizeof request);
-    assert_int_equal(uart.damaged, 2);
+    assert_int_equal(uart.faulty, 2);
     assert_int_equal(uart.overruns, 0);
 }
 
 static void damage_reply(void)
 {
-    if (chip.sent == sizeof request && uart.damaged == 0)
+    if (chip.sent == sizeof request && uart.faulty == 0)
         esp_chip_receive_faulty(0, UART_FRAME_ERR);
 }
 
@@ -414,7 +414,7 @@ TEST(a_spike_before_the_reply_loses_no_byte_of_it)
     begin_master(MBM_ESP_IDF_DRIVER_BY_PIN);
     chip.pass = damage_reply;
     works(0);
-    assert_true(uart.damaged > 0);
+    assert_true(uart.faulty > 0);
 }
 
 TEST(counters_begin_at_0_when_the_line_is_opened)
@@ -427,5 +427,5 @@ TEST(counters_begin_at_0_when_the_line_is_opened)
     mbm_espIdf_close(&uart);
     assert_true(uart.overruns > 0 && uart.stalled > 0);
     assert_int_equal(mbm_espIdf_open(&uart, &port), ESP_OK);
-    assert_int_equal(uart.overruns + uart.damaged + uart.stalled, 0);
+    assert_int_equal(uart.overruns + uart.faulty + uart.stalled, 0);
 }

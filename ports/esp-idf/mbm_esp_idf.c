@@ -108,7 +108,7 @@ static void count_events(mbm_espIdfLine *line)
         if (event.type == UART_FIFO_OVF)
             line->overruns++;
         else if (event.type == UART_FRAME_ERR || event.type == UART_PARITY_ERR)
-            line->damaged++;
+            line->faulty++;
     }
 }
 
@@ -229,7 +229,7 @@ esp_err_t mbm_espIdf_open(mbm_espIdfLine *line, mbm_port *port)
     error = install(line);
     if (error != ESP_OK)
         return error;
-    line->overruns = line->damaged = line->stalled = 0;
+    line->overruns = line->faulty = line->stalled = 0;
     line->sentAtUs = 0;
     *port = hooks;
     port->context = line;

@@ -43,7 +43,7 @@ typedef struct mbm_espIdfLine {
                             was or because the UART's interrupt was late. It counts too when the
                             driver had made 256 events, one for each character, since the last
                             read: it may have dropped one that says so */
-    uint16_t damaged;  /**< characters with a wrong stop bit or parity. A receiver's output that
+    uint16_t faulty;   /**< characters with a wrong stop bit or parity. A receiver's output that
                             floats while the transceiver sends makes some too */
     uint16_t stalled;  /**< frames that did not leave, and were given up */
 
