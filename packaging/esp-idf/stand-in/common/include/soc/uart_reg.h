@@ -1,7 +1,4 @@
 /* See esp_err.h. Licence: MIT OR Apache-2.0. */
-#ifndef UART_REG_H
-#define UART_REG_H
+#pragma once
 
 #define UART_FRM_ERR_INT_ENA (1u << 3)
-
-#endif
