@@ -155,7 +155,7 @@ TEST(damaged_characters_are_counted_and_passed_on)
     pico_receive('b' | UART_UARTDR_PE_BITS);
     pico_receive(UART_UARTDR_BE_BITS | UART_UARTDR_FE_BITS);
     assert_int_equal(port.read(port.context, taken, sizeof taken), 3);
-    assert_int_equal(line.damaged, 3);
+    assert_int_equal(line.faulty, 3);
 }
 
 /* --- a frame that does not leave */

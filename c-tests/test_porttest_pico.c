@@ -125,7 +125,7 @@ TEST(the_port_for_the_uart_of_a_pico)
     assert_int_equal(mbm_portTest_run(&test), 0);
     assert_int_equal(test.advice, 0);
     assert_int_equal(test.leftOut, 0);
-    assert_int_equal(line.damaged, 1);
+    assert_int_equal(line.faulty, 1);
 }
 
 /* --- USB */

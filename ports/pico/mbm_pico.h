@@ -31,7 +31,7 @@ typedef struct mbm_picoUart {
     bool hasDriver;       /**< switches driverPin */
 
     volatile uint16_t overruns; /**< how often the FIFO was full and characters were lost */
-    volatile uint16_t damaged;  /**< characters with a wrong stop bit or parity, and breaks */
+    volatile uint16_t faulty;   /**< characters with a wrong stop bit or parity, and breaks */
     uint16_t stalled;           /**< frames that did not leave in their time, and were dropped */
 
     mbm_ring ring;                        /**< private: received bytes */

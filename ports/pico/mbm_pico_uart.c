@@ -32,7 +32,7 @@ static void receive(mbm_picoUart *line)
             line->overruns++;
         /* A damaged character is passed on: the CRC refuses the frame that it is in. */
         if (character & (UART_UARTDR_FE_BITS | UART_UARTDR_PE_BITS | UART_UARTDR_BE_BITS))
-            line->damaged++;
+            line->faulty++;
         mbm_ring_put(&line->ring, (uint8_t)character);
     }
 }
@@ -238,7 +238,7 @@ uint8_t mbm_picoUart_open(mbm_picoUart *line, mbm_port *port)
     /* An open input, as behind a transceiver whose receiver is off, is at rest. */
     gpio_pull_up(line->rxPin);
     line->overruns = 0;
-    line->damaged = 0;
+    line->faulty = 0;
     line->stalled = 0;
     line->hasFailed = false;
     mbm_ring_begin(&line->ring, line->ringBytes, sizeof line->ringBytes);
