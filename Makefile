@@ -316,9 +316,8 @@ $(TESTS:%=$(BUILD)/$(1)/%): %: %.o $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(pa
 	@$(3) $(4) $$(filter-out $$(WITHOUT),$$(filter %.o,$$^)) $(or $(5),$(ARCHIVE)) $$(LIBS) -o $$@
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): $(patsubst c-tests/%.c,$(BUILD)/$(1)/%.o,$(patsubst ports/%.c,$(BUILD)/$(1)/%.o,$(TLS))) | certificates
 $(TLS_TESTS:%=$(BUILD)/$(1)/%): LIBS += $(TLS_LIBS)
-$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,payload conversion decimal value value_dates value_types numbers)
+$(BUILD)/$(1)/test_payload: $(patsubst %,$(BUILD)/$(1)/cli/%.o,names payload conversion decimal value value_dates value_types numbers)
 $(BUILD)/$(1)/test_payload: LIBS += -lcjson -lm
-$(BUILD)/$(1)/test_names: $(BUILD)/$(1)/cli/names.o
 $(PICO_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/pico/%.o,pico_model mbm_pico_uart mbm_pico_usb)
 $(PICO_TESTS:%=$(BUILD)/$(1)/%): INCLUDES += -Ic-tests/pico -Iports/pico
 $(STM32_TESTS:%=$(BUILD)/$(1)/%): $(patsubst %,$(BUILD)/$(1)/stm32/%.o,machine chip_model uart served_unit mbm_stm32 mbm_stm32_callbacks)

@@ -3,7 +3,6 @@
  * worse. */
 #include "client.h"
 #include "faults.h"
-#include "node.h"
 #include "test.h"
 
 /* Returns '.' for right data, 'F' for a failed call, 'W' for success with wrong data. */

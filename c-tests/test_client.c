@@ -199,15 +199,15 @@ TEST(the_master_uses_the_line_between_the_clients_requests)
     uint16_t words[4], more[4], none[1];
     uint8_t frame[64];
     mbm_line line = MBM_INIT;
-    mbm_node node = MBM_INIT;
+    mbm_node master = MBM_INIT;
     mbm_clientRequest r = asker_request(UNIT, words, sizeof words, NULL);
     server s;
 
     server_start(&s, UNIT);
     asker_begin_rtu(&a, s.line.ours);
     OK(mbm_line_setFrame(&line, frame, sizeof frame));
-    OK(mbm_node_begin(&node, &line, UNIT, more, 4, none, 1));
-    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&node, 0, 4));
+    OK(mbm_node_begin(&master, &line, UNIT, more, 4, none, 1));
+    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&master, 0, 4));
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     (void)mbm_client_poll(&a.client);
     IS(MBM_BUSY, mbm_client_suspend(&a.client, &line));
@@ -217,18 +217,18 @@ TEST(the_master_uses_the_line_between_the_clients_requests)
     IS(MBM_PENDING, mbm_client_readHoldingRegisters(&a.client, &r, 0, 4));
     IS(MBM_BUSY, mbm_client_poll(&a.client));
     a.port.idle = NULL;
-    OK(mbm_node_setBlocking(&node, 0));
-    OK(mbm_node_setResponseTimeout(&node, PATIENCE_MS));
-    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&node, 0, 4));
+    OK(mbm_node_setBlocking(&master, 0));
+    OK(mbm_node_setResponseTimeout(&master, PATIENCE_MS));
+    IS(MBM_PENDING, mbm_node_readHoldingRegisters(&master, 0, 4));
     IS(MBM_BUSY, mbm_client_resume(&a.client, &line));
-    while (mbm_node_poll(&node) == MBM_PENDING)
+    while (mbm_node_poll(&master) == MBM_PENDING)
         ;
-    OK(mbm_node_status(&node));
+    OK(mbm_node_status(&master));
     OK(mbm_client_resume(&a.client, &line));
     IS(MBM_INVALID_ARGUMENT, mbm_client_resume(&a.client, &line));
     OK(asker_wait(&a, &r));
     assert_memory_equal(words, more, sizeof words);
-    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&node, 0, 4));
+    IS(MBM_NOT_INITIALISED, mbm_node_readHoldingRegisters(&master, 0, 4));
     server_stop(&s);
 }
 

@@ -2,7 +2,7 @@
  * them, over a port in memory. */
 #include "every_call.h"
 #include "await.h"
-#include "node.h"
+#include "client.h"
 #include "server.h"
 #include "examples.h"
 #include "memory_port.h"

@@ -1,5 +1,5 @@
 /* ModbusMaster's members in C, by their names, with a libmodbus server on a terminal. */
-#include "node.h"
+#include "client.h"
 #include "server.h"
 #include "test.h"
 

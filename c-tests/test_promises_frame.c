@@ -1,5 +1,5 @@
 /* Each function for frames and packets is held to its comment in mbm.h: results, limits, NULL.
- * test_promises_text has their texts. */
+ * test_promises_values has their texts. */
 #include "mbm.h"
 #include "refused.h"
 #include "crc.h"

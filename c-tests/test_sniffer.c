@@ -297,7 +297,7 @@ TEST(a_text_that_does_not_fit_is_cut_and_terminated)
 }
 
 /* Each function of the sniffer and of the trace is held to its comment in mbm.h: results, limits,
- * defaults, NULL. test_promises_text has mbm_event_text. */
+ * defaults, NULL. test_promises_values has mbm_event_text. */
 
 static mbm_sniffer s, never;
 static mbm_trace t, no_trace;

@@ -1,4 +1,4 @@
-/* A client with buffers of full size, and what tests do with it. */
+/* A client, and a line with one node, with buffers of full size, and what tests do with them. */
 #ifndef CLIENT_H
 #define CLIENT_H
 
@@ -39,5 +39,26 @@ void asker_rest(asker *a);
 /* Polls, with sleeps between, until one request or all requests have ended. */
 uint8_t asker_wait(asker *a, const mbm_clientRequest *request);
 void asker_wait_all(asker *a);
+
+/* A line on a terminal with one node. */
+typedef struct node {
+    mbm_line line;
+    mbm_node node;
+    mbm_tty tty;
+    mbm_port port;
+    mbm_counters counters;
+    uint16_t response[MBM_MAX_READ_REGISTERS];
+    uint16_t transmit[MBM_MAX_WRITE_REGISTERS];
+    uint8_t frame[MBM_MAX_FRAME];
+} node;
+
+/* Zeroes the node, gives it its buffers and begins it for unit `slave` over `fd`. */
+void node_begin(node *n, int fd, uint8_t slave);
+
+/* Returns bit `index` of the response words. */
+int node_bit(const node *n, unsigned index);
+
+/* Sets bit `index` of the transmit words. */
+void node_set_bit(node *n, unsigned index, int on);
 
 #endif

@@ -1,6 +1,6 @@
 #include "sim.h"
 #include "crc.h"
-#include "request.h"
+#include "model.h"
 #include "test.h"
 
 static void note(sim *s, char event)

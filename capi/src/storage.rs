@@ -102,7 +102,7 @@ unsafe fn words<'a>(first: *mut u16, count: u8) -> &'a mut [u16] {
 /// To save flash, no function here checks an index. The C function that sets the fields
 /// demands a buffer of that length, and counters or NULL, valid for as long as the object is
 /// used. The engine and the client's TCP transport keep every index within the buffer:
-/// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_client_buffers.c`
+/// `tests/storage_bounds.rs`, `tests/client_bounds.rs` and `c-tests/test_buffers.c`
 /// prove that.
 macro_rules! frame_storage {
     ($count:ty) => {

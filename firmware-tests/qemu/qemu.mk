@@ -11,7 +11,7 @@ PORT_QEMU_TEST := $(BUILD)/firmware/test_porttest
 RUST_QEMU_TEST := $(BUILD)/firmware/test_rust
 QEMU_TESTS := $(filter-out $(RUST_QEMU_TEST),$(patsubst firmware-tests/qemu/%.c,$(BUILD)/firmware/%,$(wildcard firmware-tests/qemu/test_*.c)))
 QEMU_SOURCES := $(filter-out firmware-tests/qemu/test_%,$(wildcard firmware-tests/qemu/*.c)) \
-                $(patsubst %,c-tests/support/%.c,pty server model request)
+                $(patsubst %,c-tests/support/%.c,pty server model)
 QEMU_FLAGS = $(CFLAGS) $(TEST_WARNINGS) -Iinclude -Ic-tests/support -Iexamples/baremetal -Iports/baremetal $(MODBUS)
 $(QEMU_TESTS) $(RUST_QEMU_TEST): $(BUILD)/firmware/%: firmware-tests/qemu/%.c $(QEMU_SOURCES) $(wildcard firmware-tests/qemu/*.h c-tests/support/*.h examples/baremetal/*.h ports/baremetal/*.h include/mbm/*.h)
 	@mkdir -p $(@D)
