@@ -19,37 +19,21 @@ const LINES: usize = 2;
 /// The line with TCP frames: its unit 0 answers.
 const TCP_LINE: u8 = 1;
 
+const fn route(first: u16, last: u16, line: u8, unit: u16) -> Route {
+    Route {
+        first,
+        last,
+        line,
+        unit,
+    }
+}
+
 const ROUTES: [Route; 5] = [
-    Route {
-        first: 1,
-        last: 9,
-        line: 0,
-        unit: 0,
-    },
-    Route {
-        first: 11,
-        last: 19,
-        line: TCP_LINE,
-        unit: 1,
-    },
-    Route {
-        first: 100,
-        last: 100,
-        line: TCP_LINE,
-        unit: UNIT_0,
-    },
-    Route {
-        first: 200,
-        last: 200,
-        line: LOCAL,
-        unit: 3,
-    },
-    Route {
-        first: 0,
-        last: 0,
-        line: ALL_LINES,
-        unit: 0,
-    },
+    route(1, 9, 0, 0),
+    route(11, 19, TCP_LINE, 1),
+    route(100, 100, TCP_LINE, UNIT_0),
+    route(200, 200, LOCAL, 3),
+    route(0, 0, ALL_LINES, 0),
 ];
 
 /// A request that a line has.

@@ -5,17 +5,25 @@
 //!   response timeouts each read of it that is given the latency, the gap and the quiet time
 //!   succeeds. It needs twice the latency if the program has cancelled a read of it sooner.
 //!
+//! Below are random lives of plans that divide reads.
+//!
 //! `MBM_LIVES` in the environment is the number of lives of each test, `MBM_SEED` the first one.
 
+#[path = "common/divided.rs"]
+mod divided;
+#[path = "common/divided_life.rs"]
+mod divided_life;
 #[path = "common/random.rs"]
 mod random;
 
+use divided_life::Choices;
 use mbm::client::{Client, Request, Serial, Settings};
 use mbm::engine::{Buffers, Frame, MicrosSetting};
 use mbm::error::Status;
 use mbm::frame::rtu::crc16;
+use mbm::master::node::Node;
+use mbm::master::request::Line;
 use mbm::master::Master;
-use mbm::master::{node::Node, request::Line};
 use mbm::pdu::functions::FunctionSpec;
 use mbm::port::Port;
 use mbm::Error;
@@ -606,4 +614,45 @@ fn no_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
 #[test]
 fn no_queued_reading_is_wrong_and_a_device_that_answers_is_heard_again() {
     lives(live_queued);
+}
+
+// --- plans that divide the reads that a device refuses: `common/divided_life.rs` says what
+// happens, and which properties hold ---
+
+/// Random choices, up to a number of them.
+struct Chosen {
+    random: Random,
+    left: u32,
+}
+
+impl Choices for Chosen {
+    fn below(&mut self, limit: u32) -> u32 {
+        self.left = self.left.saturating_sub(1);
+        self.random.below(limit)
+    }
+
+    fn is_over(&self) -> bool {
+        self.left == 0
+    }
+}
+
+/// Says which life was wrong.
+struct Seed(u64);
+
+impl Drop for Seed {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("MBM_SEED={}", self.0);
+        }
+    }
+}
+
+#[test]
+fn no_value_is_of_another_register_and_every_field_that_is_there_is_read() {
+    for seed in random::seeds(if cfg!(miri) { 1 } else { 80 }) {
+        let seed = Seed(seed);
+        let mut random = Random::new(seed.0);
+        let left = 100 + random.below(900);
+        divided_life::live(&mut Chosen { random, left });
+    }
 }

@@ -42,11 +42,15 @@ fn field() -> impl Strategy<Value = Field> {
 }
 
 fn limits() -> impl Strategy<Value = Limits<'static>> {
-    (0..30u16, 0..100u16).prop_map(|(register_gap, bit_gap)| Limits {
+    (0..30u16, 0..100u16).prop_map(|(of_registers, of_bits)| gaps(of_registers, of_bits))
+}
+
+fn gaps(register_gap: u16, bit_gap: u16) -> Limits<'static> {
+    Limits {
         register_gap,
         bit_gap,
         ..LIMITS
-    })
+    }
 }
 
 fn device(is_mute: bool) -> impl Strategy<Value = Device> {
@@ -57,6 +61,22 @@ fn device(is_mute: bool) -> impl Strategy<Value = Device> {
         most,
         is_mute,
     })
+}
+
+/// A device that lacks these.
+fn lacking<const N: usize>(holes: [(u8, u16); N]) -> Device {
+    Device {
+        holes: holes.into(),
+        ..Device::whole()
+    }
+}
+
+/// A device that has all, and refuses reads of more.
+fn refusing_more_than(most: u16) -> Device {
+    Device {
+        most,
+        ..Device::default()
+    }
 }
 
 fn is_found(world: &World, device: &Device) {
@@ -177,10 +197,7 @@ fn registers(addresses: impl IntoIterator<Item = u16>) -> Vec<Field> {
 #[test]
 fn one_missing_field_of_a_hundred_leaves_three_reads() {
     let mut world = World::new(registers(0..100), &LIMITS, usize::MAX, 0);
-    let device = Device {
-        holes: [(HOLDING_REGISTERS, 37)].into(),
-        ..Device::whole()
-    };
+    let device = lacking([(HOLDING_REGISTERS, 37)]);
     assert_eq!(world.count, 1);
     world.run(&device, 900);
     assert_eq!(world.count, 3);
@@ -192,16 +209,10 @@ fn one_missing_field_of_a_hundred_leaves_three_reads() {
 fn one_missing_register_between_fields_leaves_two_reads() {
     for count in [4, 10, 20, 40, 100] {
         let hole = count / 2;
-        let limits = Limits {
-            register_gap: 1,
-            ..LIMITS
-        };
+        let limits = gaps(1, 0);
         let fields = registers((0..count).filter(|address| *address != hole));
         let mut world = World::new(fields, &limits, usize::MAX, SPARE);
-        let device = Device {
-            holes: [(HOLDING_REGISTERS, hole)].into(),
-            ..Device::whole()
-        };
+        let device = lacking([(HOLDING_REGISTERS, hole)]);
         assert_eq!(world.count, 1);
         world.run(&device, 900);
         is_found(&world, &device);
@@ -220,15 +231,9 @@ fn each_of_600_coils_is_read_although_the_device_ignores_reads_of_more_than_400(
         field.table = COILS;
         field.value_type = BIT;
     }
-    let limits = Limits {
-        bit_gap: 1,
-        ..LIMITS
-    };
+    let limits = gaps(0, 1);
     let mut world = World::new(fields, &limits, usize::MAX, SPARE);
-    let lacking = Device {
-        holes: [(COILS, 300)].into(),
-        ..Device::whole()
-    };
+    let lacking = lacking([(COILS, 300)]);
     world.run(&lacking, 900);
     is_found(&world, &lacking);
     // Later it answers reads of each side, and nothing if both are read at once.
@@ -244,10 +249,7 @@ fn each_of_600_coils_is_read_although_the_device_ignores_reads_of_more_than_400(
 #[test]
 fn a_device_that_refuses_long_reads_is_read_in_parts_after_one_union_was_tried() {
     let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
-    let device = Device {
-        most: 80,
-        ..Device::default()
-    };
+    let device = refusing_more_than(80);
     world.run(&device, 900);
     is_found(&world, &device);
     assert_eq!(world.count, 2);
@@ -280,10 +282,7 @@ fn a_union_that_the_device_does_not_answer_is_cut_again() {
 #[test]
 fn a_device_that_is_silent_on_long_reads_is_read_in_short_ones_all_the_time() {
     let mut world = World::new(registers(0..120), &LIMITS, usize::MAX, 0);
-    let refuses = Device {
-        most: 35,
-        ..Device::default()
-    };
+    let refuses = refusing_more_than(35);
     // All parts are found. Longer ones are tried after that.
     while world.count < 4 {
         world.step(&refuses, false);
@@ -306,10 +305,7 @@ fn a_device_that_is_silent_on_long_reads_is_read_in_short_ones_all_the_time() {
 #[test]
 fn what_was_read_before_stays_while_a_device_is_searched() {
     let mut world = World::new(registers(0..20), &LIMITS, usize::MAX, 0);
-    let whole = Device {
-        most: 2000,
-        ..Device::default()
-    };
+    let whole = refusing_more_than(2000);
     world.run(&whole, 500);
     let device = Device {
         holes: [(HOLDING_REGISTERS, 3)].into(),
@@ -333,15 +329,9 @@ fn the_search_of_one_block_leaves_others_as_they_are() {
     let mut fields = registers([21, 65, 67, 70]);
     fields[0].table = COILS;
     fields[0].value_type = BIT;
-    let limits = Limits {
-        register_gap: 2,
-        ..LIMITS
-    };
+    let limits = gaps(2, 0);
     let mut world = World::new(fields, &limits, usize::MAX, 0);
-    let device = Device {
-        holes: [(COILS, 21), (HOLDING_REGISTERS, 70)].into(),
-        ..Device::whole()
-    };
+    let device = lacking([(COILS, 21), (HOLDING_REGISTERS, 70)]);
     // The coil is found before the first read of the registers is refused.
     world.run(&device, 900);
     is_found(&world, &device);

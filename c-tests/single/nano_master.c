@@ -1,6 +1,0 @@
-#include "nano_master.h"
-
-uint8_t run(void)
-{
-    return run_master();
-}

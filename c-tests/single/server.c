@@ -1,6 +1,0 @@
-#include "server.h"
-
-uint8_t run(void)
-{
-    return run_server();
-}
