@@ -47,7 +47,6 @@ RT_THREAD_TESTS := $(filter test_rt_thread%,$(TESTS))
 ESP_IDF_TESTS := $(filter test_esp_idf%,$(TESTS))
 PORT_TESTS := $(filter test_porttest%,$(TESTS))
 # Examples that the test of the same name runs.
-TESTED_EXAMPLES := custom_server guarded_server
 # The short programs of examples/linux. Each is one file over the ports.
 EXAMPLES := basic calls custom_client custom_server guarded_server keep_link many_devices udp
 PORTS := $(patsubst ports/%.c,%,$(filter-out $(TLS),$(wildcard ports/linux/mbm_*.c)))
@@ -371,9 +370,8 @@ $(BUILD)/$(1)/test_found_port: $(patsubst %,$(BUILD)/$(1)/cli/%.o,port_over cloc
 $(patsubst c-tests/%.c,$(BUILD)/$(1)/%,$(wildcard c-tests/test_device_*.c)): LIBS += -lyaml -lcjson -lm
 $(EXAMPLES:%=$(BUILD)/$(1)/linux/%): %: %.o $(PORTS:%=$(BUILD)/$(1)/%.o) $(or $(5),$(ARCHIVE))
 	@$(2) $(4) $$(filter %.o,$$^) $(or $(5),$(ARCHIVE)) -Wl,--gc-sections -o $$@
-$(TESTED_EXAMPLES:%=$(BUILD)/$(1)/test_%): $(BUILD)/$(1)/test_%: | $(BUILD)/$(1)/linux/%
-$(BUILD)/$(1)/test_custom_server: | $(BUILD)/$(1)/linux/custom_client
-$(patsubst %,$(BUILD)/$(1)/test_%,gateway gateway_replies gateway_shortage gateway_tcp): | $(BUILD)/$(1)/mbm
+$(BUILD)/$(1)/test_example_servers: | $(patsubst %,$(BUILD)/$(1)/linux/%,custom_server custom_client guarded_server)
+$(patsubst %,$(BUILD)/$(1)/test_%,gateway gateway_replies gateway_tcp): | $(BUILD)/$(1)/mbm
 endef
 $(eval $(call variant,plain,gcc,g++,))
 $(eval $(call variant,sanitized,clang,clang++,$(SANITIZERS),$(SANITIZED_ARCHIVE)))

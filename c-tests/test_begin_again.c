@@ -2,7 +2,6 @@
 #include "every_call.h"
 #include "refused.h"
 #include "hooked_port.h"
-#include "mbm.h"
 #include "test.h"
 
 static hooked_port wire, other_wire;

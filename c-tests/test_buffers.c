@@ -5,7 +5,6 @@
  * sizes from malloc, exactly as long as begin is given. The port's hooks write and read every byte
  * that they are given, so that AddressSanitizer reports one outside. */
 #include "every_call.h"
-#include "mbm.h"
 #include "test.h"
 #include "crc.h"
 #include "hooked_port.h"

@@ -7,7 +7,6 @@
 #include "tcp_server.h"
 #include "test.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/socket.h>

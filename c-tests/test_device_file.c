@@ -4,10 +4,6 @@
 #include "report.h"
 #include "device_text.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 /* A file with one field that has these lines. */
 #define FIELD(lines) "fields:\n  - name: level\n    table: holding\n    address: 7\n" lines
 #define UINT16(lines) FIELD("    type: uint16\n" lines)

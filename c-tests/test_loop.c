@@ -9,7 +9,6 @@
 #include "tcp_server.h"
 #include "test.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/resource.h>

@@ -3,7 +3,6 @@
 #include "mbm_loop.h"
 #include "test.h"
 
-#include <errno.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>

@@ -3,7 +3,6 @@
  * was begun, one byte. */
 #include "every_call.h"
 #include "hooked_port.h"
-#include "mbm.h"
 #include "plan_device.h"
 #include "test.h"
 

@@ -7,7 +7,6 @@
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdlib.h>
 
 /* Each text of a list, in which bars are between them. */
 #define EACH(text, list)                                                                           \

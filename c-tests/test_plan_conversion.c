@@ -2,7 +2,6 @@
 #include "plan_fields.h"
 
 #include <math.h>
-#include <string.h>
 
 static void put_float(uint16_t address, float value)
 {

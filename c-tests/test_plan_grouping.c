@@ -1,7 +1,6 @@
 /* How a plan groups fields into reads, beside go-modbus-client, on made-up tables with overlaps.
  * That library sorts the fields of a unit by address. It begins a request where the limit or an
  * excluded range demands it, whatever lies between the fields. */
-#include "mbm.h"
 #include "memory_port.h"
 #include "test.h"
 

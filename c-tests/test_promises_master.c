@@ -3,7 +3,6 @@
 #include "exchanges.h"
 #include "refused.h"
 #include "hooked_port.h"
-#include "mbm.h"
 #include "test.h"
 
 enum { RESPONSE = 125, TRANSMIT = 123 };

@@ -3,7 +3,6 @@
 #include "refused.h"
 #include "crc.h"
 #include "hooked_port.h"
-#include "mbm.h"
 #include "test.h"
 
 static hooked_port wire;

@@ -1,7 +1,6 @@
 /* Each function for registers and bits, and each text of statuses, frames and events, is held to
  * its comment in mbm.h: results, limits, NULL. */
 #include "refused.h"
-#include "mbm.h"
 #include "test.h"
 #include "crc.h"
 #include "hooked_port.h"

@@ -3,7 +3,6 @@
  * begin is given. */
 #include "hooked_port.h"
 #include "every_call.h"
-#include "mbm.h"
 #include "refused.h"
 #include "test.h"
 

@@ -2,7 +2,6 @@
  * pause on the wire. Prints the table of docs/server.md. On a simulated clock. */
 #define _GNU_SOURCE
 #include "crc.h"
-#include "mbm.h"
 #include "mbm_tty.h"
 #include "pty.h"
 #include "test.h"

@@ -3,7 +3,6 @@
  * after the reply. */
 #define _GNU_SOURCE
 #include "hooked_port.h"
-#include "mbm.h"
 #include "await.h"
 #include "crc.h"
 #include "mbm_tcp.h"

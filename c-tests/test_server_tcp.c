@@ -8,7 +8,6 @@
 #include "test.h"
 
 #include <arpa/inet.h>
-#include <errno.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>

@@ -3,7 +3,6 @@
 #include "refused.h"
 #include "hooked_port.h"
 #include "examples.h"
-#include "mbm.h"
 #include "test.h"
 
 static mbm_sniffer sniffer;

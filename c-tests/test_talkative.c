@@ -1,6 +1,113 @@
-/* Peers that never stop sending: every request ends, and every poll too, whatever arrives. */
+/* Peers that never stop sending, at a client, a server and a gateway: every request ends, and every
+ * poll too, whatever arrives. */
 #include "linked.h"
-#include "talker.h"
+#include "every_call.h"
+#include "gateway_bench.h"
+#include "test.h"
+
+/* A peer that never stops sending: a port that has bytes for every read, and takes what is sent. */
+typedef struct talk {
+    const char *what;
+    const uint8_t *bytes;
+    size_t count;
+} talk;
+
+typedef struct talker {
+    const talk *says; /* again and again */
+    size_t at;
+    size_t piece;        /* how many bytes a read returns at most */
+    size_t each;         /* bytes of a connection until it is lost; 0: no limit */
+    size_t left;         /* how many of them are left */
+    unsigned reads;      /* since the last poll began */
+    unsigned most_reads; /* the most reads of one poll */
+    uint32_t *clock;
+    uint32_t step; /* microseconds that each look at the clock takes */
+    size_t sent;
+    int is_lost, is_stuck; /* it takes nothing that is sent */
+} talker;
+
+#define BYTES(text) (const uint8_t *)(text), sizeof(text) - 1
+
+static const talk TALKS[] = {
+    {"zeros", BYTES("\0")},
+    {"a text", BYTES("Port already in use\r\n")},
+    {"beginnings of ASCII frames", BYTES(":")},
+    {"an ASCII reply", BYTES(":0703021234AE\r\n")},
+    {"half an ASCII reply", BYTES(":0703021234\r\n")},
+    {"an RTU reply", BYTES("\x07\x03\x02\x12\x34\x3D\x33")},
+    {"another unit's RTU reply", BYTES("\x05\x03\x02\x12\x34\x44\xF3")},
+    {"half an RTU reply", BYTES("\x07\x03\x02\x12")},
+    {"a damaged RTU reply", BYTES("\x07\x03\x02\x12\x34\xFF\xFF")},
+    {"the number of another request", BYTES("\x7F\xFF\0\0\0\5\7\3\2\x12\x34")},
+    {"another unit with the right number", BYTES("\0\0\0\0\0\5\5\3\2\x12\x34")},
+    {"half a frame of TCP", BYTES("\0\0\0\0\0\xFE\7")},
+    {"headers that announce more than a frame", BYTES("\0\0\0\0\xFF\xFF\7")},
+    {"frames of TCP without a PDU", BYTES("\0\0\0\0\0\1\7")},
+};
+
+static int16_t talker_read(void *context, uint8_t *bytes, uint16_t capacity)
+{
+    talker *t = context;
+    size_t count = t->piece < capacity ? t->piece : capacity, i;
+
+    t->reads++;
+    if (t->each > 0 && t->left == 0)
+        t->is_lost = 1;
+    if (t->is_lost)
+        return -1;
+    if (t->each > 0) {
+        count = count < t->left ? count : t->left;
+        t->left -= count;
+    }
+    for (i = 0; i < count; i++, t->at++)
+        bytes[i] = t->says->bytes[t->at % t->says->count];
+    return (int16_t)count;
+}
+
+static int16_t talker_write(void *context, const uint8_t *bytes, uint16_t length)
+{
+    talker *t = context;
+
+    (void)bytes;
+    if (t->is_lost)
+        return -1;
+    if (t->is_stuck)
+        return 0;
+    t->sent += length;
+    return (int16_t)length;
+}
+
+static uint32_t talker_micros(void *context)
+{
+    const talker *t = context;
+
+    return *t->clock += t->step;
+}
+
+/* The port of a talker that says this, with a clock of the test. */
+static mbm_port talker_begin(talker *t, const talk *says, size_t piece, uint32_t *clock)
+{
+    const mbm_port port = {
+        .context = t, .read = talker_read, .write = talker_write, .micros = talker_micros};
+
+    memset(t, 0, sizeof *t);
+    t->says = says;
+    t->piece = piece;
+    t->clock = clock;
+    return port;
+}
+
+/* Notes that a poll begins, and that it has ended. */
+static void talker_poll_begins(talker *t)
+{
+    t->reads = 0;
+}
+
+static void talker_poll_ends(talker *t)
+{
+    if (t->reads > t->most_reads)
+        t->most_reads = t->reads;
+}
 
 enum { STEPS = 20000 };
 
@@ -242,4 +349,184 @@ TEST(a_blocking_call_ends_whatever_arrives_without_a_pause)
                     fail_msg("%s, %zu bytes a read", TALKS[i].what, piece);
             }
         }
+}
+
+/* --- at a server and at a gateway every poll ends too, and others are served --- */
+
+static mbm_server server;
+static mbm_unit unit;
+static mbm_registerTable table;
+static uint32_t now;
+
+static const talk REQUESTS[] = {
+    {"RTU requests", BYTES("\x07\x03\x00\x00\x00\x01\x84\x6C")},
+    {"ASCII requests", BYTES(":070300000001F5\r\n")},
+    {"TCP requests", BYTES("\0\1\0\0\0\6\7\3\0\0\0\1")},
+};
+
+static void begin_server(int framing, const talk *t, size_t piece)
+{
+    const mbm_port port = talker_begin(&peer, t, piece, &now);
+
+    memset(&server, 0, sizeof server);
+    memset(&table, 0, sizeof table);
+    unit = (mbm_unit){.id = UNIT};
+    table.words = words;
+    table.size = COUNT(words);
+    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
+    OK(server_begin(&server, (unsigned)framing, &port, &unit, 1, frame, sizeof frame));
+}
+
+static void serve_for(unsigned steps)
+{
+    for (unsigned step = 0; step < steps; step++, now += MS) {
+        talker_poll_begins(&peer);
+        (void)mbm_server_poll(&server);
+        talker_poll_ends(&peer);
+    }
+}
+
+static void polls_end(int framing, const talk *t, size_t piece)
+{
+    begin_server(framing, t, piece);
+    serve_for(200);
+    if (peer.most_reads > MOST_READS)
+        fail_msg("%s, framing %d: %u reads", t->what, framing, peer.most_reads);
+}
+
+FRAMING_TEST(a_poll_of_a_server_ends_whatever_arrives_without_a_pause)
+{
+    for (size_t piece = 1; piece <= 1000; piece *= 10) {
+        for (unsigned i = 0; i < COUNT(TALKS); i++)
+            polls_end(framing, &TALKS[i], piece);
+        for (unsigned i = 0; i < COUNT(REQUESTS); i++)
+            polls_end(framing, &REQUESTS[i], piece);
+    }
+}
+
+/* Over a stream there is no silence before the next request. */
+TEST(requests_without_a_pause_are_answered_one_by_one)
+{
+    begin_server(MBM_FRAMING_TCP, &REQUESTS[2], 1000);
+    for (unsigned step = 0; step < 100; step++, now += MS)
+        OK(mbm_server_poll(&server));
+    assert_in_range(peer.sent, 50 * 11, 100 * 11);
+}
+
+/* After the talk and a silence, a serial server understands the next request. */
+FRAMING_TEST(a_server_understands_the_request_after_the_talk)
+{
+    const talk *right = framing == MBM_FRAMING_ASCII ? &REQUESTS[1] : &REQUESTS[0];
+
+    if (framing == MBM_FRAMING_TCP)
+        return;
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        polls_end(framing, &TALKS[i], 7);
+        peer.piece = 0;
+        serve_for(2000);
+        (void)talker_begin(&peer, right, 100, &now);
+        peer.each = peer.left = right->count;
+        while (peer.left > 0)
+            serve_for(1);
+        peer.each = peer.piece = 0;
+        serve_for(2000);
+        if (peer.sent == 0)
+            fail_msg("no answer after %s, framing %d", TALKS[i].what, framing);
+    }
+}
+
+static gateway_bench b;
+
+static const mbm_gatewayRoute routes[] = {
+    {1, 31, 0, 0}, {101, 131, 1, 1}, {0, 0, MBM_GATEWAY_ALL_LINES, 0}};
+
+#define READ "\x03\x00\x10\x00\x01"
+#define VALUE "\x03\x02\x12\x34"
+
+static const talk MASTERS[] = {
+    {"requests", BYTES("\0\1\0\0\0\6\7\3\0\0\0\1")},
+    {"requests to a unit without a line", BYTES("\0\1\0\0\0\6\xC8\3\0\0\0\1")},
+    {"requests that the standard forbids", BYTES("\0\1\0\0\0\6\7\3\0\0\0\0")},
+    {"broadcasts", BYTES("\0\1\0\0\0\6\0\6\0\0\0\1")},
+    {"reads of all units", BYTES("\0\1\0\0\0\6\0\3\0\0\0\1")},
+    {"half a request", BYTES("\0\1\0\0\0\xFE\7\3")},
+    {"requests of two bytes", BYTES("\0\1\0\0\0\2\7\3")},
+};
+
+static void begin_gateway(void)
+{
+    gateway_bench_start(&b, routes, COUNT(routes));
+}
+
+/* Polls the gateway while the clock goes on, until the connection 1 has got a response of `length`
+ * bytes. Returns after how many milliseconds. */
+static unsigned until_response(size_t length)
+{
+    unsigned steps = 0;
+
+    while (b.sockets[1].sent_count < length && steps < STEPS) {
+        talker_poll_begins(&peer);
+        OK(mbm_gateway_poll(&b.gateway));
+        talker_poll_ends(&peer);
+        for (unsigned i = 0; i < BENCH_LINES; i++)
+            b.wires[i].now += MS;
+        for (unsigned i = 0; i < BENCH_CONNECTIONS; i++)
+            b.sockets[i].now += MS;
+        now += MS;
+        steps++;
+    }
+    assert_true(steps < STEPS);
+    return steps;
+}
+
+TEST(a_master_that_never_stops_keeps_no_other_from_being_answered)
+{
+    for (unsigned i = 0; i < COUNT(MASTERS); i++)
+        for (int is_stuck = 0; is_stuck <= 1; is_stuck++)
+            for (size_t piece = 1; piece <= 1000; piece *= 10) {
+                const mbm_port port = talker_begin(&peer, &MASTERS[i], piece, &now);
+
+                begin_gateway();
+                now = 0;
+                OK(mbm_gateway_close(&b.gateway, 0));
+                OK(mbm_gateway_open(&b.gateway, 0, &port));
+                peer.is_stuck = is_stuck;
+                /* Its silent device costs 100 ms and the quiet time for each of its requests. */
+                for (unsigned round = 0; round < 4; round++) {
+                    b.sockets[1].sent_count = 0;
+                    ASK(1, round, 7, READ);
+                    if (until_response(9) > 1500 || peer.most_reads > 64)
+                        fail_msg("%s, %zu bytes a read", MASTERS[i].what, piece);
+                }
+                b.sockets[1].sent_count = b.wires[1].sent_count = 0;
+                ASK(1, 9, 101, READ);
+                assert_in_range(until_response(9), 1, 1500);
+            }
+}
+
+FRAMING_TEST(a_device_that_never_stops_keeps_no_request_and_no_other_line)
+{
+    static uint8_t incoming[MBM_MAX_ASCII_FRAME];
+    mbm_client *of_line = &b.clients[0];
+
+    for (unsigned i = 0; i < COUNT(TALKS); i++) {
+        const mbm_port port = talker_begin(&peer, &TALKS[i], 7, &now);
+
+        begin_gateway();
+        now = 0;
+        OK(CLIENT_BEGIN(of_line, framing, &port, incoming, outgoing));
+        OK(mbm_client_setResponseTimeout(of_line, 300));
+        for (unsigned round = 0; round < 4; round++) {
+            b.sockets[1].sent_count = 0;
+            ASK(1, round, UNIT, READ);
+            if (until_response(9) > 3000 || peer.most_reads > MOST_READS)
+                fail_msg("%s, framing %d", TALKS[i].what, framing);
+        }
+        b.sockets[1].sent_count = 0;
+        ASK(1, 9, UNIT, READ);
+        ASK(1, 10, 101, READ);
+        REPLY(1, 1, VALUE);
+        /* Both responses. */
+        assert_in_range(until_response(18), 1, 3000);
+    }
 }

@@ -3,8 +3,6 @@
 #include "test.h"
 #include "tls_pair.h"
 
-#include <errno.h>
-
 static tls_pair pair;
 static mbm_tls_files files;
 

@@ -8,7 +8,6 @@
 #include "pty.h"
 #include "test.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <linux/serial.h>
 #include <sys/ioctl.h>

@@ -8,7 +8,6 @@
 #include "pty.h"
 #include "test.h"
 
-#include <errno.h>
 #include <unistd.h>
 
 enum { TIMEOUT_MS = 20 };

@@ -4,7 +4,6 @@
 #include "test.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { FIRST = 100, WORDS = 8, UNTOUCHED = 0xABCD };
 

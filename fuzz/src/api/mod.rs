@@ -9,7 +9,6 @@
 mod check;
 
 mod asked;
-mod bits;
 mod client;
 mod frame;
 mod gateway;
@@ -22,7 +21,6 @@ mod node;
 mod packet;
 mod plan;
 mod pool;
-mod port;
 mod ports;
 mod prepared;
 mod records;
@@ -58,7 +56,7 @@ fn step(w: &World) {
         26 | 27 => frame::step(w),
         28 if w.byte() & 1 == 0 => registers::step(w),
         28 => types::step(w),
-        29 => bits::step(w),
+        29 => registers::step_of_bits(w),
         30 => ports::change(w),
         _ => match w.byte() {
             byte @ 0..0xE0 => w.clock.set(w.clock.get().wrapping_add(1 << (byte % 26))),
