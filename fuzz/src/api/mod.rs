@@ -21,6 +21,7 @@ mod node;
 mod packet;
 mod plan;
 mod pool;
+mod port;
 mod ports;
 mod prepared;
 mod records;

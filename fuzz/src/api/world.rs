@@ -2,7 +2,7 @@
 
 use super::memory::Memory;
 use super::pool::{Pool, Records};
-use super::ports::Port;
+use super::port::Port;
 use mbm_c::*;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
