@@ -16,13 +16,14 @@
 pub mod ascii;
 mod extras;
 mod late;
+mod late_units;
 mod poll;
 mod search;
 mod settings;
 mod storage;
 mod transaction;
 
-pub use late::LateUnits;
+pub use late_units::LateUnits;
 pub use settings::{MicrosSetting, Settings};
 pub use storage::{Buffers, Count, Counter, Frame, Storage, Words, COUNTERS};
 pub use transaction::Transaction;
