@@ -2,8 +2,10 @@
 #![cfg(feature = "usbd-serial")]
 
 use mbm::error::Error;
+use mbm::frame::rtu;
 use mbm::port::{Port, UsbSerial};
 use mbm::server::{Server, Tables, Unit};
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 use usb_device::bus::{PollResult, UsbBus, UsbBusAllocator};
@@ -105,8 +107,16 @@ impl UsbBus for Bus {
 type Shared = Arc<Mutex<Wire>>;
 type Usb = UsbSerial<'static, Bus, fn() -> u32>;
 
+thread_local! {
+    static NOW: Cell<u32> = const { Cell::new(0) };
+}
+
 fn micros() -> u32 {
-    0
+    NOW.get()
+}
+
+fn wait(millis: u32) {
+    NOW.set(NOW.get().wrapping_add(millis * 1000));
 }
 
 /// The port, and the bus that it is on.
@@ -235,6 +245,82 @@ fn a_host_that_does_not_read_holds_the_port_back() {
         port.flush();
     }
     assert_eq!(read, written);
+}
+
+#[test]
+fn a_response_that_the_host_does_not_read_is_given_up_and_the_next_one_is_whole() {
+    let (wire, mut port) = open();
+    configure(&wire, &mut port);
+    set_dtr(&wire, true);
+    let mut server = Server::rtu_over_tcp(port);
+    let mut unit = Unit::new(1, Tables::NONE.with_holding_registers(0, [7; 40]));
+    let mut request = [0; 8];
+    let read_forty = [3, 0, 0, 0, 40];
+    rtu::emit(&mut request, 1, |pdu| {
+        pdu[..5].copy_from_slice(&read_forty);
+        Ok(5)
+    })
+    .unwrap();
+    for _ in 0..3 {
+        send(&wire, &request);
+        for _ in 0..9 {
+            assert_eq!(server.serve(micros(), &mut unit), Ok(()));
+            wait(100);
+        }
+        wait(1000);
+        let results: Vec<_> = (0..5).map(|_| server.serve(micros(), &mut unit)).collect();
+        assert_eq!(
+            results.iter().filter(|result| result.is_err()).count(),
+            1,
+            "{results:?}"
+        );
+        // This packet was in the endpoint already.
+        assert_eq!(take(&wire).map(|packet| packet.len()), Some(PACKET));
+        server.begin_rtu_over_tcp();
+        send(&wire, &request);
+        let mut response = vec![];
+        for _ in 0..10 {
+            assert_eq!(server.serve(micros(), &mut unit), Ok(()));
+            response.extend(take(&wire).unwrap_or_default());
+        }
+        assert_eq!(response.len(), 3 + 80 + 2);
+        assert!(rtu::parse(&response).is_ok());
+    }
+}
+
+#[test]
+fn a_host_that_takes_nothing_for_a_second_loses_the_link_once_and_what_it_did_not_read() {
+    let (wire, mut port) = open();
+    configure(&wire, &mut port);
+    while port.write(&[3; 100]) != Ok(0) {}
+    wait(999);
+    assert_eq!(port.write(&[3; 100]), Ok(0));
+    // The second begins again with each packet that the host takes.
+    assert_eq!(take(&wire), Some(vec![3; PACKET]));
+    assert_ne!(port.write(&[3; 100]), Ok(0));
+    while port.write(&[3; 100]) != Ok(0) {}
+    wait(999);
+    assert_eq!(port.write(&[3; 100]), Ok(0));
+    wait(1);
+    assert_eq!(port.write(&[3; 100]), Err(Error::LinkLost));
+    assert_eq!(port.read(&mut [0; 8]), Ok(0));
+    assert_eq!(take(&wire), Some(vec![3; PACKET]));
+    assert_eq!(port.write(&[4; 5]), Ok(5));
+    assert_eq!(take(&wire), Some(vec![4; 5]));
+}
+
+#[test]
+fn a_link_that_is_lost_in_a_flush_is_reported_by_the_next_function() {
+    let (wire, mut port) = open();
+    configure(&wire, &mut port);
+    set_dtr(&wire, true);
+    assert_eq!(port.write(&[1; PACKET + 4]), Ok(PACKET + 4));
+    assert!(!port.flush());
+    set_dtr(&wire, false);
+    assert!(port.flush());
+    assert!(port.flush());
+    assert_eq!(port.read(&mut [0; 8]), Err(Error::LinkLost));
+    assert_eq!(port.read(&mut [0; 8]), Ok(0));
 }
 
 #[test]
