@@ -166,7 +166,7 @@ def test_unit_0_of_a_device_over_tcp_answers_and_on_a_serial_line_it_stays_a_bro
 def traced(plain, folder):
     """Begins a gateway whose system calls are counted."""
     strace = Strace(f"{folder}/calls")
-    return strace, lambda *words: Program(*strace.before, plain.path, "gateway", LISTEN, *words)
+    return strace, lambda *words: Program(*strace.before, plain.path, "gateway", "--timeout", "20s", LISTEN, *words)
 
 
 @pytest.mark.parametrize("clients, each, others", [(1, 300, 0), (1, 300, 12), (10, 40, 0)])
