@@ -6,13 +6,16 @@
 #undef WITHOUT_MBM
 #else
 #define PLAN(call) (call)
+#define WITH_PLAN
 #endif
 #include "client.h"
 
 #ifdef GROUPED
 enum { READS = 4 };
 
+#ifdef WITH_PLAN
 static const uint16_t counts[READS] = {6, 2, 1, 1};
+#endif
 
 #define BEGIN(plan) mbm_plan_beginGrouped((plan), &client, &setup, counts, NULL)
 #else
