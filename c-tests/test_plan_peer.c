@@ -30,19 +30,12 @@ static mbm_planPosition positions[FIELDS];
 static mbm_planRead reads[FIELDS];
 static mbm_clientRequest requests[4];
 static uint16_t data[WORDS];
-static unsigned updates[FIELDS];
-
-static void count_update(void *context, mbm_plan *plan, uint16_t field)
-{
-    updates[field]++;
-}
 
 static mbm_planSetup setup = {.fields = fields,
                               .positions = positions,
                               .reads = reads,
                               .data = data,
                               .requests = requests,
-                              .update = count_update,
                               .backoffMs = 100,
                               .longestBackoffMs = 200,
                               .fieldCount = FIELDS,
@@ -56,7 +49,6 @@ static asker a;
 static void begin(uint8_t requestCount)
 {
     memset(&plan, 0, sizeof plan);
-    memset(updates, 0, sizeof updates);
     setup.requestCount = requestCount;
     OK(mbm_client_setResponseTimeout(&a.client, 200));
     OK(mbm_plan_begin(&plan, &a.client, &setup, NULL));
@@ -129,19 +121,11 @@ TEST(every_value_is_that_of_the_server_on_a_line)
     check_values(s.mapping);
     /* The plan sees values that change. */
     s.mapping->tab_registers[3] = 4711;
-    {
-        unsigned before = updates[0];
-
-        while (updates[0] < before + 2) {
-            OK(mbm_plan_poll(&plan));
-            (void)mbm_client_poll(&a.client);
-        }
-    }
-    {
-        int64_t value = 0;
-
-        OK(mbm_plan_getInteger(&plan, 0, 3, &value));
-        assert_int_equal(value, 4711);
+    for (int64_t value = 0; value != 4711;) {
+        /* It is an error while a read that took too long is repeated. */
+        (void)mbm_plan_getInteger(&plan, 0, 3, &value);
+        OK(mbm_plan_poll(&plan));
+        (void)mbm_client_poll(&a.client);
     }
     server_stop(&s);
 }
