@@ -17,8 +17,9 @@ uint16_t uart_stalled(void)
     return stalls;
 }
 
-/* Notes that the transmitter took bytes, or none. Returns 1 if it has taken none for too long. */
-static uint8_t stands_still(uint16_t taken)
+/* Notes that the transmitter took bytes, or none. If it has taken none for too long, starts the
+ * UART again with `start` and returns 1. */
+static uint8_t gave_up(uint16_t taken, void (*start)(void))
 {
     uint32_t now = clock_micros(0);
 
@@ -32,15 +33,22 @@ static uint8_t stands_still(uint16_t taken)
     }
     is_sending = 0;
     stalls++;
+    start();
     return 1;
 }
 
-/* For uart_flush: whether it has ended, the last bit having left or not. */
-static uint8_t has_ended(uint8_t is_done)
+/* What uart_write returns. */
+static int16_t written(uint16_t count, void (*start)(void))
+{
+    return gave_up(count, start) != 0u ? (int16_t)-1 : (int16_t)count;
+}
+
+/* What uart_flush returns: 1 if the last bit has left, or was given up. */
+static uint8_t flushed(uint8_t is_done, void (*start)(void))
 {
     if (is_done != 0u) {
         is_sending = 0;
-    } else if (stands_still(0) != 0u) {
+    } else if (gave_up(0, start) != 0u) {
         has_failed = 1;
     } else {
         return 0;

@@ -71,21 +71,11 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
         DATA = bytes[count];
         count++;
     }
-    if (stands_still(count) != 0u) {
-        start_line();
-        return -1;
-    }
-    return (int16_t)count;
+    return written(count, start_line);
 }
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    if (has_ended((FLAGS & BUSY) == 0u) == 0u) {
-        return 0;
-    }
-    if (has_failed != 0u) {
-        start_line();
-    }
-    return 1;
+    return flushed((FLAGS & BUSY) == 0u, start_line);
 }

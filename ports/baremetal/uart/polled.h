@@ -31,21 +31,11 @@ int16_t uart_write(void *context, const uint8_t *bytes, uint16_t length)
         DATA = bytes[count];
         count++;
     }
-    if (stands_still(count) != 0u) {
-        uart_start();
-        return -1;
-    }
-    return (int16_t)count;
+    return written(count, uart_start);
 }
 
 uint8_t uart_flush(void *context)
 {
     (void)context;
-    if (has_ended(IS_DONE) == 0u) {
-        return 0;
-    }
-    if (has_failed != 0u) {
-        uart_start();
-    }
-    return 1;
+    return flushed(IS_DONE, uart_start);
 }
