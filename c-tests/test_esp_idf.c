@@ -1,23 +1,13 @@
 /* The port for ESP-IDF over a model of its UART driver: faults, what they are to the program, and
  * the next request when the cause is gone. */
 #include "mbm_esp_idf.h"
+#include "port_user.h"
 #include "test.h"
 #include "uart_model.h"
 
-enum { UNIT = 17, MOST = 4000000 /* microseconds: the longest time of a request */ };
+enum { MOST = 4000000 /* microseconds: the longest time of a request */ };
 
 static mbm_espIdfLine uart;
-static mbm_port port;
-static mbm_line line;
-static mbm_node node;
-static mbm_server server;
-static mbm_unit unit;
-static mbm_registerTable table;
-static uint16_t words[120], response[2];
-static uint8_t frame[MBM_MAX_FRAME];
-/* Reads registers 0 and 1 of unit 17, and the reply. */
-static const uint8_t request[] = {17, 3, 0, 0, 0, 2, 0xC6, 0x9B};
-static const uint8_t reply[] = {17, 3, 4, 2, 0x2B, 0, 100, 0x9B, 0xA9};
 static const mbm_espIdfDriver drivers[] = {MBM_ESP_IDF_NO_DRIVER, MBM_ESP_IDF_DRIVER_BY_UART,
                                            MBM_ESP_IDF_DRIVER_BY_PIN};
 
@@ -25,10 +15,7 @@ static void set_up(void)
 {
     esp_chip_reset();
     memset(&uart, 0, sizeof uart);
-    memset(&line, 0, sizeof line);
-    memset(&node, 0, sizeof node);
-    memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
+    user_forget();
     uart.uart = UART_NUM_1;
     uart.txPin = 4;
     uart.rxPin = 5;
@@ -47,9 +34,7 @@ static void begin_master(mbm_espIdfDriver driver)
     set_up();
     uart.driver = driver;
     assert_int_equal(mbm_espIdf_open(&uart, &port), ESP_OK);
-    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
-    OK(mbm_node_begin(&node, &line, UNIT, response, COUNT(response), NULL, 0));
-    OK(mbm_line_setBaudRate(&line, 19200));
+    user_begin_master();
 }
 
 static void begin_server(mbm_espIdfDriver driver)
@@ -58,13 +43,7 @@ static void begin_server(mbm_espIdfDriver driver)
     chip.reply = NULL;
     uart.driver = driver;
     assert_int_equal(mbm_espIdf_open(&uart, &port), ESP_OK);
-    words[0] = 555;
-    words[1] = 100;
-    table = (mbm_registerTable){.words = words, .size = COUNT(words)};
-    unit.id = UNIT;
-    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_setBaudRate(&server, 19200));
+    user_begin_server();
 }
 
 /* A request, which ends in bounded time. */
@@ -320,18 +299,6 @@ TEST(a_line_that_was_closed_is_a_lost_link_and_may_be_opened_again)
 
 /* --- reception */
 
-static unsigned read_all(void)
-{
-    uint8_t bytes[100];
-    unsigned count = 0;
-    int16_t taken;
-
-    while ((taken = port.read(port.context, bytes, sizeof bytes)) > 0)
-        count += (unsigned)taken;
-    assert_int_equal(taken, 0);
-    return count;
-}
-
 static const uint8_t flood[3000];
 
 /* arduino-esp32 6326 and 6336: after an overflow nothing is received any more. */
@@ -340,7 +307,7 @@ TEST(bytes_that_the_program_is_too_late_for_are_counted_and_the_next_request_wor
     for (unsigned length = 1300; length <= sizeof flood; length += 100) {
         begin_master(MBM_ESP_IDF_DRIVER_BY_UART);
         esp_chip_receive(flood, length);
-        assert_true(read_all() < length);
+        assert_true(user_read_all() < length);
         assert_true(uart.overruns > 0);
         works(0);
     }
@@ -353,12 +320,12 @@ TEST(an_interrupt_that_comes_too_late_is_an_overrun_that_is_counted)
     chip.isMasked = true;
     esp_chip_receive(flood, ESP_FIFO);
     esp_chip_unmask();
-    assert_int_equal(read_all(), ESP_FIFO);
+    assert_int_equal(user_read_all(), ESP_FIFO);
     assert_int_equal(uart.overruns, 0);
     chip.isMasked = true;
     esp_chip_receive(flood, ESP_FIFO + 1);
     esp_chip_unmask();
-    assert_true(read_all() <= ESP_FIFO);
+    assert_true(user_read_all() <= ESP_FIFO);
     assert_int_equal(uart.overruns, 1);
     works(0);
 }
@@ -371,7 +338,7 @@ TEST(an_overrun_whose_event_found_the_queue_full_is_counted)
     chip.isMasked = true;
     esp_chip_receive(flood, ESP_FIFO + 1);
     esp_chip_unmask();
-    assert_true(read_all() < MBM_MAX_FRAME + ESP_FIFO + 1);
+    assert_true(user_read_all() < MBM_MAX_FRAME + ESP_FIFO + 1);
     assert_int_equal(uart.overruns, 1);
     works(0);
 }
@@ -380,11 +347,11 @@ TEST(a_frame_between_two_reads_counts_nothing_and_a_full_buffer_loses_nothing)
 {
     begin_master(MBM_ESP_IDF_DRIVER_BY_UART);
     esp_chip_receive(flood, MBM_MAX_FRAME - 1);
-    assert_int_equal(read_all(), MBM_MAX_FRAME - 1);
+    assert_int_equal(user_read_all(), MBM_MAX_FRAME - 1);
     assert_int_equal(uart.overruns, 0);
     /* The ring is full, and the FIFO nearly. */
     esp_chip_receive(flood, 1024 + 1 + ESP_FIFO);
-    assert_int_equal(read_all(), 1024 + 1 + ESP_FIFO);
+    assert_int_equal(user_read_all(), 1024 + 1 + ESP_FIFO);
     works(0);
 }
 
@@ -421,7 +388,7 @@ TEST(counters_begin_at_0_when_the_line_is_opened)
 {
     begin_master(MBM_ESP_IDF_DRIVER_BY_UART);
     esp_chip_receive(flood, sizeof flood);
-    (void)read_all();
+    (void)user_read_all();
     chip.isStopped = true;
     IS(MBM_LINE_BUSY, ask());
     mbm_espIdf_close(&uart);

@@ -1,33 +1,20 @@
 /* The port for RT-Thread over a model of its serial framework: faults, what they are to the
  * program, and the next request when the cause is gone. */
 #include "mbm_rt_thread.h"
+#include "port_user.h"
 #include "serial_model.h"
 #include "test.h"
 
-enum { UNIT = 17, MOST = 4000000 /* microseconds: the longest time of a request */ };
+enum { MOST = 4000000 /* microseconds: the longest time of a request */ };
 
 static mbm_rtThreadLine uart;
-static mbm_port port;
-static mbm_line line;
-static mbm_node node;
-static mbm_server server;
-static mbm_unit unit;
-static mbm_registerTable table;
-static uint16_t words[120], response[2];
-static uint8_t frame[MBM_MAX_FRAME];
-/* Reads registers 0 and 1 of unit 17, and the reply. */
-static const uint8_t request[] = {17, 3, 0, 0, 0, 2, 0xC6, 0x9B};
-static const uint8_t reply[] = {17, 3, 4, 2, 0x2B, 0, 100, 0x9B, 0xA9};
 
 static void set_up(void)
 {
     mbm_rtThread_close(&uart);
     rtt_chip_reset();
     memset(&uart, 0, sizeof uart);
-    memset(&line, 0, sizeof line);
-    memset(&node, 0, sizeof node);
-    memset(&server, 0, sizeof server);
-    memset(&unit, 0, sizeof unit);
+    user_forget();
     uart.uart = "uart2";
     uart.driverPin = RTT_DRIVER_PIN;
     uart.baud = 19200;
@@ -41,22 +28,14 @@ fixture each_test = {set_up, NULL}, all_tests;
 static void begin_master(void)
 {
     assert_int_equal(mbm_rtThread_open(&uart, &port), RT_EOK);
-    OK(mbm_line_beginRtu(&line, &port, frame, sizeof frame));
-    OK(mbm_node_begin(&node, &line, UNIT, response, COUNT(response), NULL, 0));
-    OK(mbm_line_setBaudRate(&line, 19200));
+    user_begin_master();
 }
 
 static void begin_server(void)
 {
     chip.reply = NULL;
     assert_int_equal(mbm_rtThread_open(&uart, &port), RT_EOK);
-    words[0] = 555;
-    words[1] = 100;
-    table = (mbm_registerTable){.words = words, .size = COUNT(words)};
-    unit.id = UNIT;
-    OK(mbm_unit_serveHoldingRegisters(&unit, &table));
-    OK(mbm_server_beginRtu(&server, &port, &unit, 1, frame, sizeof frame));
-    OK(mbm_server_setBaudRate(&server, 19200));
+    user_begin_server();
 }
 
 /* A request, which ends in bounded time. */
@@ -297,18 +276,6 @@ TEST(a_line_that_was_closed_is_a_lost_link_and_may_be_opened_again)
 
 /* --- reception */
 
-static unsigned read_all(void)
-{
-    uint8_t bytes[100];
-    unsigned count = 0;
-    int16_t taken;
-
-    while ((taken = port.read(port.context, bytes, sizeof bytes)) > 0)
-        count += (unsigned)taken;
-    assert_int_equal(taken, 0);
-    return count;
-}
-
 static const uint8_t flood[2000];
 
 /* rt-thread 6365 and 8428: bytes are overwritten, and nothing says so. */
@@ -318,7 +285,7 @@ TEST(bytes_that_the_thread_is_too_late_for_are_counted_and_the_next_request_work
         set_up();
         begin_master();
         rtt_chip_receive(flood, length);
-        assert_int_equal(read_all(), MBM_MAX_FRAME);
+        assert_int_equal(user_read_all(), MBM_MAX_FRAME);
         assert_int_equal(mbm_rtThread_lost(&uart), length - MBM_MAX_FRAME);
         works(0);
         mbm_rtThread_close(&uart);
@@ -336,7 +303,7 @@ TEST(bytes_that_waited_for_the_interrupt_are_all_received)
     rtt_chip_receive(flood, 200);
     chip.isMasked = false;
     rtt_chip_receive(flood, 1);
-    assert_int_equal(read_all(), 201);
+    assert_int_equal(user_read_all(), 201);
     works(0);
 }
 
