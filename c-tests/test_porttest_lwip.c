@@ -45,16 +45,10 @@ TEST(the_port_passes_the_test_kit)
     assert_int_equal(begin(NULL), 0);
     near_port = mbm_lwip_port(&near_end);
     far_port = mbm_lwip_port(&far_end);
-    test.port = &near_port;
-    test.other = &far_port;
+    test = porttest_connection(&near_port, &far_port, begin, hang_up);
     test.reference = raw_micros;
-    test.begin = begin;
-    test.hangUp = hang_up;
     test.yield = yield;
-    test.say = porttest_say;
-    test.holds = 256;
-    assert_int_equal(mbm_portTest_run(&test), 0);
-    assert_int_equal(test.wrong, 0);
+    porttest_passes(&test);
     mbm_lwip_close(&near_end);
     mbm_lwip_close(&far_end);
     mbm_lwip_closeListener(&listener);

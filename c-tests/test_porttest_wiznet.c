@@ -43,7 +43,6 @@ static void setup(void)
     chip_begin();
     memset(&near_end, 0, sizeof near_end);
     memset(&far_end, 0, sizeof far_end);
-    memset(&test, 0, sizeof test);
     near_end.micros = far_end.micros = micros;
     near_end.number = 7;
     near_end.address[0] = 127;
@@ -52,36 +51,25 @@ static void setup(void)
     assert_int_equal(begin(NULL), 0);
     near_port = mbm_wiznet_port(&near_end);
     far_port = mbm_wiznet_port(&far_end);
-    test.port = &near_port;
-    test.other = &far_port;
-    test.begin = begin;
-    test.hangUp = hang_up;
-    test.say = porttest_say;
-    test.holds = 256;
+    test = porttest_connection(&near_port, &far_port, begin, hang_up);
 }
 
 fixture each_test = {setup, chip_end};
 
-static void passes(void)
-{
-    assert_int_equal(mbm_portTest_run(&test), 0);
-    assert_int_equal(test.wrong, 0);
-}
-
 TEST(the_port_passes_the_test_kit)
 {
-    passes();
+    porttest_passes(&test);
 }
 
 TEST(the_port_passes_it_if_the_chip_sends_and_shows_a_few_bytes_at_a_time)
 {
     the_chip.most_sent = 7;
     the_chip.most_received = 5;
-    passes();
+    porttest_passes(&test);
 }
 
 TEST(the_port_passes_it_if_the_peer_acknowledges_late)
 {
     the_chip.busy_sends = 200;
-    passes();
+    porttest_passes(&test);
 }
