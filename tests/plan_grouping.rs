@@ -21,7 +21,7 @@ fn with(mut field: Field, change: impl FnOnce(&mut Field)) -> Field {
     field
 }
 
-/// No limits but those of the standard, with gaps of so many registers.
+/// The limits of the standard alone. A read may cross gaps of up to this number of registers.
 fn gap(register_gap: u16) -> Limits<'static> {
     Limits {
         register_gap,
